@@ -55,8 +55,9 @@ def test_times_touch_nothing(k: int, name: str) -> None:
     bodies = [hull(pose.main[:, :2]) for pose in scene.poses]
     for k, place in enumerate(places[: len(bodies)]):
         gaps = [_gap(place, body) for body in bodies]
-        # Outlines are sampled every tenth of an inch.
-        assert place.foot is not None or gaps[k] <= min(min(gaps) + 0.05 * scale, 0.2 * scale)
+        # Nearer to it than to any other, clearly; outlines are sampled every tenth of an inch.
+        others = min((*gaps[:k], *gaps[k + 1 :]), default=np.inf)
+        assert place.foot is not None or (gaps[k] <= 0.2 * scale and gaps[k] + 0.03 * scale <= others)
 
 
 def _gap(place: Place, outline: np.ndarray) -> float:

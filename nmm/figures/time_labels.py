@@ -18,8 +18,8 @@ _CHARACTER, _LINE = 0.66 * SIZE / 72.0, 0.95 * SIZE / 72.0
 _PAD = 0.05
 #: A text that is farther from its subject than this has a line that leads there, in.
 _FAR = 0.16
-#: So much nearer to its subject a text stands rather where another one is nearer, in.
-_UNCLEAR = 0.3
+#: A text is not clearly its subject's where another one is as near, but for so much; and what nearness that outweighs, in.
+_AS_NEAR, _UNCLEAR = 0.08, 0.3
 #: Where a text is tried: so many directions, so many distances, the farthest, in.
 _DIRECTIONS, _DISTANCES, _FARTHEST = 40, 24, 2.0
 
@@ -82,7 +82,7 @@ def places(subjects: Sequence[Subject], ground: Ground, scale: float) -> list[Pl
         place = None
         while queue:
             _, k, is_unclear = heapq.heappop(queue)
-            if not is_unclear and _nearest(candidates[k], half, others) < apart[k]:
+            if not is_unclear and _nearest(candidates[k], half, others) < apart[k] + _AS_NEAR * scale:
                 heapq.heappush(queue, (float(unclear[k]), k, True))
                 continue
             foot = feet[k]
