@@ -76,6 +76,8 @@ def test_a_comparison_marks_it() -> None:
     for mark, run, gain in zip(marks, runs, gains, strict=True):
         assert mark.get_xdata() == pytest.approx([math.log(50.0) / gain], rel=1e-6)
         assert mark.get_ydata() == pytest.approx([0.02 * run.error_norm[0]])
+    assert len(marks) == 2
+    assert len({mark.get_color() for mark in (*marks, *panel.get_legend().legend_handles)}) == 1
     legends = [legend for axes in made.axes if (legend := axes.get_legend()) is not None]
     texts = [text.get_text() for legend in legends for text in legend.get_texts()]
     assert [texts.count(name) for name in ("RG", "RG (2)", "down to 2 %")] == [1, 1, 1]

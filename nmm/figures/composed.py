@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -156,7 +155,7 @@ def comparison(trajectories: Sequence[Trajectory], *, width: float = _WIDTH) -> 
         _draw_norms(panels[0], runs, worn, sigma, "σ_min")
     units = style.units(runs[0].r_units), style.units(runs[0].robot.u_units)
     _draw_norms(panels[1], runs, worn, [run.error_norm for run in runs], f"‖e‖ {units[0]}")
-    _mark_settled(panels[1], runs, worn)
+    _mark_settled(panels[1], runs)
     _draw_norms(panels[2], runs, worn, [np.linalg.norm(run.u, axis=1) for run in runs], f"‖u‖ {units[1]}")
     style.legend(panels[0])
     style.legend(panels[1], only=_SETTLED)
@@ -187,15 +186,16 @@ def _draw_norms(
         style.note(axes, "zero throughout")
 
 
-def _mark_settled(axes: Axes, runs: Sequence[Trajectory], worn: Sequence[resolver_style.Look]) -> None:
-    """A mark where each run's error has settled, in its colour; the legend has one for all."""
-    if all(settling_time(run) is None for run in runs):
-        return
-    dot: Any = {"marker": "o", "markersize": 5.0, "linestyle": "none"}
-    axes.plot([], [], color=style.GREY, label=_SETTLED, **dot)
-    for run, look in zip(runs, worn, strict=True):
+def _mark_settled(axes: Axes, runs: Sequence[Trajectory]) -> None:
+    """A mark on the curve of each run's error where it has settled, all in the legend's colour."""
+    label = _SETTLED
+    for run in runs:
         if (after := settling_time(run)) is not None:
-            axes.plot(run.t[0] + after, BAND * run.error_norm[0], color=look.color, label="_", **dot)
+            axes.plot(
+                run.t[0] + after, BAND * run.error_norm[0], "o", color=style.GREY, markersize=6.0,
+                markeredgecolor="white", markeredgewidth=0.8, label=label, zorder=6,
+            )  # fmt: skip
+            label = "_"
 
 
 def write_run_figures(

@@ -18,7 +18,7 @@ _CHARACTER, _LINE = 0.66 * SIZE / 72.0, 0.95 * SIZE / 72.0
 _PAD = 0.05
 #: A text that is farther from its subject than this has a line that leads there, in.
 _FAR = 0.16
-#: A text is not clearly its subject's where another one is as near, but for so much; and what nearness that outweighs, in.
+#: Where another subject is as near but for so much, a text stands rather so much farther from its own, in.
 _AS_NEAR, _UNCLEAR = 0.08, 0.3
 #: Where a text is tried: so many directions, so many distances, the farthest, in.
 _DIRECTIONS, _DISTANCES, _FARTHEST = 40, 24, 2.0
