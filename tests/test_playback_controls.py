@@ -173,6 +173,30 @@ def test_inside_another_page_the_wheel_is_the_readers_until_he_clicks(
     page.wait_for_function("scrollY === 0")
 
 
+def test_inside_another_page_its_plots_let_the_reader_scroll_too(
+    small_robot: Robot, window: Window, tmp_path: Path
+) -> None:
+    file_url([drive(small_robot)], tmp_path)
+    outer = OUTER.replace("#plots=none", "").replace('"250"', '"500"')
+    (tmp_path / "outer.html").write_text(outer, encoding="utf-8")
+    page = window.page
+    page.set_viewport_size({"width": 480, "height": 600})
+    page.goto((tmp_path / "outer.html").as_uri())
+    inner = page.frames[1]
+    inner.wait_for_function("window.nmm && !document.body.classList.contains('loading')")
+    inner.evaluate("nmm.plots.show(true); nmm.plots.open(nmm.plots.ids())")
+    plots = "document.getElementById('plots').scrollTop"
+    page.mouse.move(200, 400)
+    page.mouse.wheel(0, 60)
+    page.wait_for_function("scrollY === 60")
+    assert inner.evaluate(plots) == 0
+    page.mouse.click(200, 50)
+    page.mouse.move(200, 350)
+    page.mouse.wheel(0, 40)
+    inner.wait_for_function(f"{plots} === 40")
+    assert page.evaluate("scrollY") == 60
+
+
 def test_inside_another_page_a_finger_scrolls_it_until_it_has_tapped(
     small_robot: Robot, browser: Browser, tmp_path: Path
 ) -> None:

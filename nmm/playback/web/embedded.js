@@ -9,8 +9,9 @@ if (window.parent !== window) {
   const wake = () => classList.remove("asleep", "told");
 
   function pass(event) {
-    if (!classList.contains("asleep") || !view.contains(event.target)) return;
-    if (event.type === "pointerdown" && event.pointerType !== "touch") return;
+    if (!classList.contains("asleep")) return;
+    if (event.type === "wheel") event.stopPropagation(); // over the plots, too
+    if (!view.contains(event.target) || (event.type === "pointerdown" && event.pointerType !== "touch")) return;
     event.stopPropagation();
     clearTimeout(telling);
     classList.add("told");
