@@ -78,8 +78,8 @@ def playback_scene(
     at = [[interpolated(times, frame.t, values) for values in (frame.q, frame.wheels)] for frame in frames]
     boxes = np.array(
         [
-            extent.robot_boxes(motion.robot, *now, motion.surroundings.carried)
-            for motion, now in zip(motions, at, strict=True)
+            extent.robot_boxes(motion.robot, q, turned, motion.surroundings.carried)
+            for motion, (q, turned) in zip(motions, at, strict=True)
         ]
     )
     shown = _ellipsoids(motions, frames, ellipsoids)
