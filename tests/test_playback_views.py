@@ -15,7 +15,7 @@ from playback_browser import small_robot as small_robot
 from playback_browser import window as window
 from playback_robot import drive, hand_built_robot
 
-from nmm.playback import Motion
+from nmm.playback import Motion, Surroundings
 from nmm.playback.extent import corners, robot_boxes
 from nmm.playback.rolling import wheel_angles
 from nmm.robots.robot import Robot
@@ -354,6 +354,30 @@ def test_texts_have_a_rim_and_names_of_axes_lie_on_none(
     assert low < 0.35
     assert high > 0.65
     assert page.evaluate(axes) == [False, True, True]
+
+
+def test_a_scenarios_first_view_is_between_heading_and_tools(
+    robot: Robot, window: Window, tmp_path: Path
+) -> None:
+    """In a narrow window; what it looks at is in the middle of what they leave free."""
+    motion = drive(robot)
+    around = Surroundings(camera=(0.0, -4.0, 3.0, 0.0, 0.0, 0.5))
+    motion = Motion(robot, motion.t, motion.q, motion.u, surroundings=around)
+    points = [[0.0, 0.0, 0.5], [0.0, 0.0, 1.5], [0.0, 0.0, -0.5]]
+    for width in (1280, 420):
+        window.page.set_viewport_size({"width": width, "height": 800})
+        page = window.open(file_url([motion], tmp_path))
+        high, head, tools, bar = page.evaluate(
+            """["view", "heading", "tools", "bar"].map((id) => document.getElementById(id))
+               .map((part) => part.getBoundingClientRect())
+               .map(({ height, top, bottom }, i) => [height, bottom, top, top][i])"""
+        )
+        middle, top, bottom = (0.5 * high * (1 - y) for _, y, _ in page.evaluate(PROJECT, points))
+        if width == 1280:
+            assert middle == pytest.approx(0.5 * high, abs=1.0)
+            continue
+        assert middle == pytest.approx(0.5 * (head + min(tools, bar)), abs=8.0)
+        assert head < top < bottom < min(tools, bar)
 
 
 @pytest.mark.parametrize(("scheme", "least"), [("light", 1.6), ("dark", 2.0)])

@@ -242,6 +242,21 @@
     nmm.viewer.set_dirty();
   };
 
+  // A scenario's first view: as it was chosen for a wide window; in a narrow one, in what heading and tools leave free.
+  camera.open = (numbers) => {
+    camera.put(numbers);
+    const [[top, bottom], another] = covered([]);
+    if (another) return;
+    const { target, update } = nmm.viewer.controls;
+    const height = view.clientHeight;
+    const away = eye.position.clone().sub(target).multiplyScalar(height / Math.max(height - top - bottom, 0.3 * height));
+    const pixel = (camera.unit() * away.length()) / height;
+    target.addScaledVector(new THREE.Vector3(0, 1, 0).applyQuaternion(eye.quaternion), 0.5 * (top - bottom) * pixel);
+    eye.position.copy(target).add(away);
+    update();
+    planes();
+  };
+
   // What is held may have left the picture since: then all of it is fitted again, if nobody has moved the eye.
   camera.refit = () => {
     if (camera.moved || !camera.held) return;

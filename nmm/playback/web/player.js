@@ -44,7 +44,7 @@
     const { camera, time } = nmm.stage.opening;
     player.seek(time);
     nmm.camera.reset(); // the play bar is there only now
-    if (typeof camera !== "string") nmm.camera.put(camera);
+    if (typeof camera !== "string") nmm.camera.open(camera);
     else if (camera !== "iso") nmm.camera.look(camera);
     nmm.texts.fit();
     nmm.address.start();
