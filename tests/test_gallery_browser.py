@@ -44,9 +44,24 @@ def test_a_motion_plays_with_the_script_beside_it(gallery: Gallery, window: Wind
 
 def test_a_picture_plays_where_it_stands(gallery: Gallery, window: Window) -> None:
     page = window.page
+    page.set_viewport_size({"width": 1280, "height": 800})
     page.goto(gallery.index.as_uri())
     page.locator("a.play").click()
     frame = page.frame_locator(".card iframe")
     frame.locator("body.playing").wait_for()
     assert frame.locator("#time").inner_text() != ""
     assert page.locator("a.play").count() == 0
+    # What moves is seen, and the bar ends within the card.
+    seen, inside = page.frames[1].evaluate(
+        """() => {
+          viewer.render();
+          const { matrixWorld } = nmm.node(nmm.motions[0].root);
+          const p = new MeshCat.THREE.Vector3().setFromMatrixPosition(matrixWorld).project(viewer.camera);
+          const at = [0.5 * (1 + p.x) * innerWidth, 0.5 * (1 - p.y) * innerHeight];
+          const { tagName } = document.elementFromPoint(...at);
+          const shown = [...document.querySelectorAll("#bar > *")];
+          return [tagName, shown.every((part) => part.getBoundingClientRect().right <= innerWidth - 8)];
+        }"""
+    )
+    assert seen == "CANVAS"
+    assert inside
