@@ -26,7 +26,7 @@ def corners(boxes: Array) -> Array:
     return np.stack([boxes[..., _CORNERS[:, axis], axis] for axis in range(3)], axis=-1)
 
 
-def robot_boxes(robot: Robot, q: Array, wheels: Array, carried: Sequence[Carried] = ()) -> Array:
+def robot_boxes(robot: Robot, q: Array, wheels: Array, *, carried: Sequence[Carried] = ()) -> Array:
     """Boxes along the world's axes around everything visible, what is carried too, (K, 2, 3) m, for q (K, n)
     and wheels (K, D)."""
     placements = Placements(robot)

@@ -78,7 +78,7 @@ def playback_scene(
     at = [[interpolated(times, frame.t, values) for values in (frame.q, frame.wheels)] for frame in frames]
     boxes = np.array(
         [
-            extent.robot_boxes(motion.robot, q, turned, motion.surroundings.carried)
+            extent.robot_boxes(motion.robot, q, turned, carried=motion.surroundings.carried)
             for motion, (q, turned) in zip(motions, at, strict=True)
         ]
     )
