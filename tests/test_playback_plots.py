@@ -316,22 +316,27 @@ WRITTEN = """() => {
 
 
 def test_a_long_name_ends_before_the_values_and_keeps_its_unit(plotted: Plotted) -> None:
+    """And the cursor is behind it."""
     page = plotted.page
-    page.evaluate("nmm.plots.open(['inputs'])")
-    page.evaluate("nmm.seek(1)")
-    lane = "nmm.lanes.find(({ key }) => key === 'u_omega')"
-    short = page.evaluate(f"{lane}.text")
-    page.evaluate(f"{lane}.text = 'rate of shoulder_lift_joint_of_the_left_arm'")
-    (name,) = (one for one in page.evaluate(WRITTEN) if one[1].startswith("rate of"))
-    now = page.evaluate(
-        f"""() => {lane}.now.getBoundingClientRect().left
-          - document.querySelector("[data-panel=inputs] canvas").getBoundingClientRect().left"""
-    )
-    page.evaluate(f"{lane}.text = '{short}'")
+    page.evaluate("nmm.plots.open(['inputs']); nmm.seek(0)")
+    row = page.locator("[data-panel=inputs] .row").nth(1)
+    short = row.locator(".name").inner_text()
+    row.locator(".name").evaluate("name => name.textContent = 'rate of shoulder_lift_joint_of_the_left_arm'")
+    parts = row.evaluate("row => [...row.children].map((part) => part.getBoundingClientRect().toJSON())")
+    named = row.locator(".name").evaluate("({ scrollWidth, clientWidth }) => scrollWidth > clientWidth")
+    row.locator(".name").evaluate("(name, short) => (name.textContent = short)", short)
+    cursor = page.locator("#cursor").bounding_box()
+    behind = page.evaluate("getComputedStyle(document.getElementById('cursor')).zIndex")
     page.evaluate("nmm.plots.open(nmm.plots.first)")
-    assert name[1].endswith("… [rad/s]")
-    assert 0.0 <= name[2] < name[3] <= now
-    assert name[3] - name[2] > 80.0
+    assert named
+    shown = [part for part in parts if part["width"]]
+    assert len(shown) == 3
+    for before, after in pairwise(shown):
+        assert before["right"] <= after["left"] + 0.5
+    assert shown[0]["width"] > 80.0
+    assert cursor is not None
+    assert shown[0]["left"] < cursor["x"] < shown[0]["right"]
+    assert int(behind) < row.evaluate("row => Number(getComputedStyle(row).zIndex)")
 
 
 #: A quantity that two decimals or a power of ten tell.

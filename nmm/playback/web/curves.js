@@ -7,8 +7,6 @@
   Object.assign(curves, { LEFT: 56, RIGHT: 10, GAP: 6 });
   const [ALONE, AMONG, NAME] = [84, 46, 15];
   const ROW = 20;
-  // Px: where a lane's name begins, the least room for it, and that of a run's value at the cursor, without and with a sign.
-  const [BEGIN, LEAST, VALUE] = [8, 100, [66, 88]];
   const TINY = 1e-13;
 
   curves.height = (lane, count) =>
@@ -229,7 +227,7 @@
       }
       pen.restore();
     }
-    named(pen, lane, upper, scale.nothing || limits(away), about);
+    tell(pen, lane, upper, scale.nothing || limits(away), about);
     return undefined;
   };
 
@@ -258,25 +256,14 @@
 
   curves.named = (lane) => (lane.unit ? `${lane.text} [${lane.unit}]` : lane.text);
 
-  // What it is, where its limits are, if out of the picture, and that there is nothing to see. To the right of a name
-  // among others are the runs' values.
-  function named(pen, lane, top, aside, { right, alone, colors }) {
-    const long = (text) => pen.measureText(text).width;
-    Object.assign(pen, { lineWidth: 4, lineJoin: "round", strokeStyle: colors.plot });
-    if (alone) {
-      Object.assign(pen, { textAlign: "right", fillStyle: colors.quiet });
-      pen.strokeText(aside, right - 6, top + 10);
-      pen.fillText(aside, right - 6, top + 10);
-      pen.textAlign = "left";
-      return;
-    }
-    const values = having(lane).length * VALUE[Number(nmm.runs.length > 1)];
-    const room = Math.max(right - BEGIN - values, LEAST);
-    const unit = lane.unit ? ` [${lane.unit}]` : "";
-    const name = fit(pen, lane.text, room - long(unit)) + unit;
-    pen.fillStyle = colors.ink;
-    pen.fillText(name, BEGIN, top + 7);
-    pen.fillStyle = colors.quiet;
-    if (long(name) + long(aside) + 10 <= room) pen.fillText(aside, BEGIN + long(name) + 10, top + 7);
+  // Where its limits are, if out of the picture, or that there is nothing to see: within a curve that is alone in its
+  // panel, else beside its name.
+  function tell(pen, lane, top, aside, { right, alone, colors }) {
+    if (!alone) return (lane.aside.textContent = aside);
+    Object.assign(pen, { textAlign: "right", lineWidth: 4, lineJoin: "round", strokeStyle: colors.plot, fillStyle: colors.quiet });
+    pen.strokeText(aside, right - 6, top + 10);
+    pen.fillText(aside, right - 6, top + 10);
+    pen.textAlign = "left";
+    return undefined;
   }
 }

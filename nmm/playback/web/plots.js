@@ -52,7 +52,7 @@
     let top = 0;
     panel.lanes.forEach((lane, i) => {
       Object.assign(lane, { top, bottom: top + heights[i] + nmm.curves.GAP });
-      if (panel.lanes.length > 1) lane.now.style.top = `${panel.canvas.offsetTop + top}px`;
+      if (lane.row) lane.row.style.top = `${panel.canvas.offsetTop + top}px`;
       nmm.curves.draw(pen, lane, top, heights[i], { ...about, alone: panel.lanes.length === 1 });
       top = lane.bottom;
     });
@@ -172,7 +172,13 @@
         changed();
       });
       for (const lane of lanes) {
-        lane.now = nmm.element(another ? part : summary, "span", { class: "now", "aria-hidden": "true" });
+        if (another) {
+          lane.row = nmm.element(part, "div", { class: "row", "aria-hidden": "true" });
+          nmm.element(lane.row, "span", { class: "name" }, lane.text);
+          if (lane.unit) nmm.element(lane.row, "span", {}, `[${lane.unit}]`);
+          lane.aside = nmm.element(lane.row, "span", { class: "aside" });
+        }
+        lane.now = nmm.element(lane.row || summary, "span", { class: "now", "aria-hidden": "true" });
         lane.values = nmm.runs.map((run) => {
           const value = nmm.element(lane.now, "span", { hidden: "" }, " ");
           if (nmm.runs.length > 1) value.prepend(nmm.sign("line", run.color, run.dash));
