@@ -6,6 +6,7 @@ They carry what is wrong, where, what was expected, what came, and what is avail
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
 from types import UnionType
 from typing import Any, TypeVar, cast
 
@@ -32,10 +33,22 @@ T = TypeVar("T")
 E = TypeVar("E", bound="NmmError")
 
 
+@dataclass(frozen=True)
+class Setting:
+    """A key of a scenario, step by step, and a value for it, as YAML; its text is for a shell."""
+
+    path: tuple[str, ...]
+    value: str
+
+    def __str__(self) -> str:
+        return f"--set '{'.'.join(self.path)}={self.value}'"
+
+
 class NmmError(Exception):
     """Root of every error that nmm raises on purpose; its text is made of its fields.
 
-    The text is "where: what; expected …, got …; available: …", on one line of at most 300 characters.
+    The text is "where: what; expected …, as in …, got …; available: …", on one line of at most 300
+    characters.
 
     Parameters
     ----------
@@ -45,6 +58,8 @@ class NmmError(Exception):
     expected : what would have been right, in words: "a number above 0"
     got : what came instead, as it came; `nmm.errors.NOTHING` where nothing did
     available : the names that there are; the text shows ten near ones and how many more there are
+    mend : what would mend it, behind what was expected: a `Setting`, or how a command takes it
+    unknown : what `got` is the name of, where there is none of that name: "key", "frame"
 
     Examples
     --------
@@ -63,28 +78,32 @@ class NmmError(Exception):
         expected: str = "",
         got: object = NOTHING,
         available: Iterable[object] | None = None,
+        mend: Setting | str | None = None,
+        unknown: str = "",
     ) -> None:
         self.finding = None if isinstance(what, str) else what
         self.what, self.where, self.expected, self.got = str(what), str(where), expected, got
         self.available = None if available is None else tuple(str(name) for name in available)
+        self.mend, self.unknown = mend, unknown
         super().__init__(self._text())
 
     def at(self, where: object, kind: Callable[..., E] | None = None) -> E:
         """The same error of the kind given (its own), further out: `where` comes before its own."""
         return self.placed(": ".join(part for part in (str(where), self.where) if part), kind)
 
-    def placed(self, where: str, kind: Callable[..., E] | None = None) -> E:
-        """The same error of the kind given (its own), with another `where`."""
-        fields = {name: getattr(self, name) for name in ("expected", "got", "available")}
+    def placed(self, where: str, kind: Callable[..., E] | None = None, **others: Any) -> E:
+        """The same error of the kind given (its own), with another `where`, and other fields where given."""
+        fields = {name: getattr(self, name) for name in ("expected", "got", "available", "mend", "unknown")}
         fields["what"] = self.what if self.finding is None else self.finding
         made: Callable[..., Any] = kind or type(self)
-        return cast("E", made(where=where, **fields))
+        return cast("E", made(where=where, **fields | others))
 
     def _text(self) -> str:
         said = self.what
         if self.expected:
             came = "" if self.got is NOTHING else f", got {self.show(self.got)}"
-            said += f"{'; ' if said else ''}expected {self.expected}{came}"
+            mend = "" if self.mend is None else f", as in {self.mend}"
+            said += f"{'; ' if said else ''}expected {self.expected}{mend}{came}"
         where = _without_middle(self.where, max(LONGEST, MOST - len(said) - LONGEST // 2))
         head = ": ".join(part for part in (where, said) if part)
         head = one_line(printable(one_line(head, MOST)), MOST)
@@ -156,10 +175,10 @@ class RobotError(InputError):
     def _text(self) -> str:  # of up to twelve things, of which each has its own length
         return printable(f"{self.where}: {self.what}") if self.findings else super()._text()
 
-    def placed(self, where: str, kind: Callable[..., E] | None = None) -> E:
+    def placed(self, where: str, kind: Callable[..., E] | None = None, **others: Any) -> E:
         """The same error with another `where`, and what was found."""
         if kind is not None or not self.findings:
-            return super().placed(where, kind)
+            return super().placed(where, kind, **others)
         return type(self)(self.what, where=where, findings=self.findings)  # type: ignore[return-value]  # of its own kind, as E is then
 
 
@@ -301,7 +320,8 @@ def no_such(
     if not near and len(asked) < LONGEST:
         near = difflib.get_close_matches(asked, short, n=1)
     hint = hint or (f" (did you mean {quoted(near[0])}?)" if near else "")
-    return error(f"unknown {kind} {quoted(name)}{hint}", where=where, got=name, available=names)
+    what = f"unknown {kind} {quoted(name)}{hint}"
+    return error(what, where=where, got=name, available=names, unknown=kind)
 
 
 def expect_known(

@@ -23,6 +23,7 @@ from nmm.errors import (
     RobotError,
     RunError,
     ScenarioError,
+    Setting,
     expect,
     expect_kind,
     expect_known,
@@ -145,6 +146,7 @@ def test_the_beginning_and_the_count_stay() -> None:
         RobotError("x" * 1000),
         nmm.SingularError("lost rank", where="at t = 2 s"),
         KeyedError(("task", 0), "unknown", got=3),
+        InputError(expected="a key", got=3, mend=Setting(("resolver", "alpha"), "5"), unknown="key"),
     ],
 )
 @pytest.mark.parametrize("through", [lambda error: pickle.loads(pickle.dumps(error)), copy.deepcopy])
@@ -169,6 +171,12 @@ def test_an_error_further_out_keeps_its_fields() -> None:
     assert type(outer) is ScenarioError
     assert outer.where == "file.yaml:3: task"
     assert (outer.got, outer.available, outer.what) == (inner.got, inner.available, inner.what)
+    assert outer.unknown == inner.unknown == "frame"
+    asked = InputError(expected="a key", mend=Setting(("resolver", "alpha"), "5"))
+    assert asked.at("a").mend == asked.mend
+    other = asked.placed("a", mend="--resolvers pg:alpha=5")
+    assert (other.where, other.mend, other.expected) == ("a", "--resolvers pg:alpha=5", asked.expected)
+    assert KeyedError(("task",), "a").at("b").place == ("task",)
     assert InputError("a").at("b").where == "b"
     assert inner.placed("").where == ""
 

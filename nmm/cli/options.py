@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from nmm.errors import InputError, NmmError, expect, no_such
+from nmm.errors import InputError, NmmError, Setting, expect, no_such
 from nmm.kinds import RESOLVERS, TASKS
 from nmm.text_format import listed, split_outside_brackets
 
@@ -247,17 +247,17 @@ def of_several(several: Sequence[Chosen], one: Chosen, settings: Mapping[str, ob
     except InputError as error:
         from nmm.scenario.resolvers import kinds_with
 
-        key = error.got
-        kinds = kinds_with(str(key)) if error.what.startswith("unknown key") else []
-        if kinds and f"resolver.{key}" in settings:
+        key = str(error.got)
+        kinds = kinds_with(key) if error.unknown == "key" and f"resolver.{key}" in settings else []
+        if kinds:
             what = f"{key} is a key of {listed(kinds)}: {kinds[0]}:{key}=… in --resolvers"
             raise InputError(what, where=error.where) from None
-        before, setting, value = error.expected.partition("--set 'resolver.")
-        if not setting:
-            raise
-        others = dict.fromkeys(other.text for other in several if other is not one)
-        pasted = f"{before}--resolvers '{','.join([*others, one.text])}:{value}"
-        raise InputError(error.what, where=error.where, expected=pasted, got=error.got) from None
+        match error.mend:
+            case Setting(("resolver", key), value):
+                others = dict.fromkeys(other.text for other in several if other is not one)
+                pasted = ",".join([*others, f"{one.text}:{key}={value}"])
+                raise error.placed(error.where, mend=f"--resolvers '{pasted}'") from None
+        raise
 
 
 def _twice(option: str, first: str, second: str) -> InputError:

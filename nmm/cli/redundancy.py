@@ -24,7 +24,7 @@ from nmm.cli.options import (
     values_of,
 )
 from nmm.cli.output import FAILED, OK, complain, print_table, progress, show_table, show_text, warn
-from nmm.errors import InputError, SingularError, expect
+from nmm.errors import InputError, Setting, SingularError, expect
 from nmm.files import replaceable
 
 if TYPE_CHECKING:
@@ -220,14 +220,12 @@ def _as_options() -> Iterator[None]:
     except InputError as error:
         from nmm.scenario.resolvers import kinds_with
 
-        setting = "--set 'resolver."
-        what, expected = (text.replace("period=", "--period S") for text in (error.what, error.expected))
-        before, found, value = expected.partition(setting)
-        for kind in kinds_with(value.partition("=")[0])[:1]:
-            expected = f"{before}--set resolver.kind={kind} {found}{value}"
-        if (what, expected) == (error.what, error.expected):
-            raise
-        raise InputError(what, where=error.where, expected=expected, got=error.got) from None
+        where = f"--{error.where}" if error.where in ("laps", "period", "resolvers") else error.where
+        mend = error.mend
+        match mend:
+            case Setting(("resolver", key)):
+                mend = f"--set resolver.kind={kinds_with(key)[0]} {mend}"
+        raise error.placed(where, mend=mend) from None
 
 
 def _show(found: Repeatability, name: str, folder: Path) -> None:

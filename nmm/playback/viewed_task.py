@@ -85,8 +85,7 @@ class ViewedTask:
         try:
             J = jacobians.J(0.0, q)
         except SingularError as error:
-            reason = str(error).partition(": ")[2] or str(error)
-            return answer | {"problem": reason, "parts": [], "ellipsoids": [], "arrows": []}
+            return answer | {"problem": str(error.placed("")), "parts": [], "ellipsoids": [], "arrows": []}
         world = in_world_axes(J, jacobians.task, robot, q)
         lost, near = _directions(world / jacobians.scales[:, np.newaxis])
         said = lost if len(lost) else near

@@ -187,8 +187,7 @@ class Coordinates:
         try:
             return vector(values, self.n, "q")
         except InputError as error:
-            what = f"robot {self.name} has q = {few(self.q_names)}"
-            raise InputError(what, where="q", expected=error.expected, got=error.got) from None
+            raise error.placed("q", what=f"robot {self.name} has q = {few(self.q_names)}") from None
 
     @property
     def rest(self) -> Array:

@@ -24,7 +24,7 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, ErrorDetails
 
-from nmm.errors import InputError, NmmError, ScenarioError, expect_known, no_such
+from nmm.errors import E, InputError, NmmError, ScenarioError, expect_known, no_such
 from nmm.scenario.yaml_text import Place
 from nmm.text_format import quoted
 
@@ -41,6 +41,10 @@ class KeyedError(ScenarioError):
     def __init__(self, place: Place, what: str = "", **fields: Any) -> None:
         super().__init__(what, **fields)
         self.place = place
+
+    def placed(self, where: str, kind: Callable[..., E] | None = None, **others: Any) -> E:
+        """The same error with another `where`, at the same place."""
+        return super().placed(where, kind or partial(type(self), self.place), **others)  # type: ignore[return-value]  # of its own kind, as E is then
 
     @classmethod
     def of(cls, place: Place, error: NmmError) -> KeyedError:
@@ -97,8 +101,8 @@ class Part(BaseModel):
                 if key in cls.renamed:
                     raise KeyedError((str(key),), f"this key is called {cls.renamed[key]} now")
                 if key not in cls.model_fields:
-                    with at(str(key)):
-                        raise no_such("key", key, cls.model_fields, hint=cls.unknown(str(key)))
+                    hint, made = cls.unknown(str(key)), partial(KeyedError, (str(key),))
+                    raise no_such("key", key, cls.model_fields, error=made, hint=hint)
         return data
 
     @classmethod
@@ -160,10 +164,7 @@ def first_error(error: ValidationError, data: Any) -> KeyedError:
     what = first.what
     if len(details) > 1:
         what = f"the first of {len(details)} faults" + (f": {what}" if what else "")
-    place = as_written(first.place, data)
-    return KeyedError(
-        place, what, where=first.where, expected=first.expected, got=first.got, available=first.available
-    )
+    return first.placed(first.where, partial(KeyedError, as_written(first.place, data)), what=what)
 
 
 def _explained(detail: ErrorDetails) -> KeyedError:

@@ -10,7 +10,7 @@ from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.sequence import Sequence
 from nmm.control.sequenced import SequencedController
-from nmm.errors import InputError, expect, few
+from nmm.errors import InputError, Setting, expect, few
 from nmm.functions.tasks.task import Stack
 from nmm.kinds import RESOLVERS
 from nmm.progress import Progress
@@ -328,8 +328,8 @@ class ScenarioPart(Part):
         q = robot.q(self.q0)
         names, values = ", ".join(robot.q_names[i] for i in arm), ", ".join(f"{q[i]:.4g}" for i in arm)
         example = f"{{kind: coordinates, of: [{names}], reference: [{values}], gain: 1}}"
-        expected = f"{redundancy} rows, as in --set 'resolver.added_task={example}'"
-        raise InputError(what, expected=expected, got=rows)
+        mend = Setting(("resolver", "added_task"), example)
+        raise InputError(what, expected=f"{redundancy} rows", got=rows, mend=mend)
 
     def explicit(self) -> dict[str, Any]:
         """Every key as plain data, with what the library chooses where the file leaves it open."""

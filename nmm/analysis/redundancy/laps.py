@@ -278,8 +278,8 @@ def common_period(controllers: Iterable[Controller], q: Array) -> float:
         for task in (*controller.task, *controller.given.added_task):
             periods += _periods(task.reference, configuration)
     if not periods:
-        what = "the task stands still: expected a reference that goes round, as a circle, or period="
-        raise InputError(what, where="period")
+        expected = "a reference that goes round, as a circle, or the time in which it does"
+        raise InputError("the task stands still", where="period", expected=expected)
     longest = max(periods)
     for rounds in range(1, MOST_ROUNDS + 1):
         T = rounds * longest
@@ -287,7 +287,7 @@ def common_period(controllers: Iterable[Controller], q: Array) -> float:
             return T
     each = ", ".join(f"{one:.6g} s" for one in dict.fromkeys(periods))
     what = f"the references go round in {each}, which have no common period"
-    raise InputError(what, where="period", expected="period=")
+    raise InputError(what, where="period", expected="the time after which all are back")
 
 
 def _periods(reference: Function, configuration: Configuration) -> list[float]:
@@ -304,7 +304,7 @@ def _periods(reference: Function, configuration: Configuration) -> list[float]:
     if all(np.array_equal(values[0], value) for value in values[1:]):
         return []
     what = f"{type(reference).__name__} does not say its period"
-    raise InputError(what, where="period", expected="period=, the time in which the reference goes round")
+    raise InputError(what, where="period", expected="the time in which the reference goes round")
 
 
 def expect_periodic(controller: Controller, q: Array, T: float, laps: int) -> None:

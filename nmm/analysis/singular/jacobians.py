@@ -239,7 +239,7 @@ class Jacobians:
         problem = self.robot.platform.problem(q[: self.robot.platform.n_p])
         if problem is not None or not np.all(np.isfinite(J)):
             why = problem or "the task or its reference is undefined there"
-            raise SingularError(f"at t = {t:g} s: {why}")
+            raise SingularError(why, where=f"at t = {t:g} s")
         return J
 
 

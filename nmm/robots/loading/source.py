@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Literal
 from xml.etree import ElementTree
@@ -136,9 +137,8 @@ def source_path(source: str | Path, package_dirs: Sequence[str | Path]) -> Path:
         return Path(source)
     robots = bundled_robots()
     if source not in robots:
-        error: RobotError = no_such("robot", source, robots, error=RobotError)
         expected = "a bundled name, or the path of a .urdf, .xacro or .xml file"
-        raise RobotError(error.what, expected=expected, got=source, available=robots)
+        raise no_such("robot", source, robots, error=partial(RobotError, expected=expected))
     return robots[source]
 
 
