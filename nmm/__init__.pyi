@@ -124,8 +124,8 @@ from .robots.robot import Robot as Robot
 from .rollouts.rollout import rollout as rollout
 from .ros.bag import read_bag as read_bag
 from .runs.disturbances import Disturbances as Disturbances
+from .runs.loop_state import LoopState as LoopState
 from .runs.robot_loop import Loop as Loop
-from .runs.robot_loop import LoopState as LoopState
 from .runs.simulation import simulate as simulate
 from .runs.trajectory import Outcome as Outcome
 from .runs.trajectory import Trajectory as Trajectory

@@ -47,11 +47,12 @@ class Jump(NamedTuple):
 
 class MeasuredState:
     """Where the robot is, `q` (n,) at the time of the last call; `at` is the time of the last measurement
-    that was used, s, -inf before the first one."""
+    that was used, s, -inf before the first one. `history` has to be given the inputs."""
 
-    def __init__(self, robot: Robot, history: HeldHistory, tolerances: Tolerances, period: float) -> None:
-        self._robot, self._history, self._tolerances = robot, history, tolerances
-        self._period = period
+    def __init__(self, robot: Robot, tolerances: Tolerances, period: float) -> None:
+        self._robot, self._tolerances, self._period = robot, tolerances, period
+        remembered = math.ceil((2.0 * tolerances.watchdog + tolerances.lag) / period) + 3
+        self.history = HeldHistory(robot, remembered)
         lengths = unit_codes(robot.q_units) == METRES
         self._off = np.where(lengths, tolerances.metres, tolerances.radians)
         self._platform = robot.platform.n_p
@@ -74,7 +75,7 @@ class MeasuredState:
     def move_on(self, since: float, until: float) -> None:
         """No measurement, but inputs, between two calls."""
         if self.at > -math.inf:
-            self.q = self._history.moved(self.q, since, until)
+            self.q = self.history.moved(self.q, since, until)
 
     def take(self, now: float, q: ArrayLike | None, at: float) -> tuple[Refused | None, Jump | None]:
         """Use the measurement q (n,) made at the time `at`, or say why not; and whether it has the platform
@@ -89,10 +90,10 @@ class MeasuredState:
         if self._used is not None and self._beyond(self._used, self.at, read, at).any():
             if not self._agrees(read, at):
                 return Refused.JUMP, None
-            gone = read - self._history.moved(self._used, self.at, at)
+            gone = read - self.history.moved(self._used, self.at, at)
             jump = Jump(float(np.hypot(*gone[:2])), float(abs(gone[2])))
         self._used, self.at, self._candidate = read, at, None
-        self.q = self._history.moved(read, at, now)
+        self.q = self.history.moved(read, at, now)
         return None, jump
 
     def _in_time(self, now: float, q: ArrayLike | None, at: float) -> tuple[Refused | None, Array | None]:
@@ -124,15 +125,15 @@ class MeasuredState:
         if self._platform >= 3:
             changed[:2] = changed[:2].any()
         self._seen = read
-        self._still = np.where(changed, 0.0, self._still + self._history.way(earlier, at))
-        behind = self._history.way(at - self._tolerances.lag, at)
+        self._still = np.where(changed, 0.0, self._still + self.history.way(earlier, at))
+        behind = self.history.way(at - self._tolerances.lag, at)
         return bool(np.any(self._still > self._off + behind))
 
     def _beyond(self, start: Array, since: float, read: Array, at: float) -> Array:
         """Which coordinates (n,) the inputs cannot have brought from where they were to where they are read:
         a robot that lags or slips is somewhere between rest and twice its way."""
-        ahead = self._history.moved(start, since, at)
-        way = self._history.way(since - self._tolerances.lag, at)
+        ahead = self.history.moved(start, since, at)
+        way = self.history.way(since - self._tolerances.lag, at)
         return np.asarray(np.abs(read - ahead) > self._off + way)
 
     def _agrees(self, read: Array, at: float) -> bool:

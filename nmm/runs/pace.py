@@ -18,7 +18,9 @@ class Paced(Protocol):
 
     period: float
     state: Any
-    u: Array
+
+    @property
+    def u(self) -> Array: ...
 
     def step(self, now: float, q: ArrayLike | None = None, measured_at: float | None = None) -> Array: ...
 

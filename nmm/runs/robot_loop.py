@@ -5,53 +5,24 @@ from __future__ import annotations
 
 import math
 import time
-from collections import Counter
 from collections.abc import Callable
-from enum import StrEnum
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, positive, scalar
 from nmm.control.controller import Controller
-from nmm.control.goal import norms, unit_codes
 from nmm.errors import InputError
 from nmm.findings import Finding
-from nmm.runs.far_limits import FarLimits
-from nmm.runs.held_history import HeldHistory
+from nmm.runs.loop_clock import LoopClock
+from nmm.runs.loop_inputs import LoopInputs
 from nmm.runs.loop_log import LoopFindings, LoopLog
-from nmm.runs.measured_state import MeasuredState, Refused, Tolerances
+from nmm.runs.loop_state import LoopState
+from nmm.runs.loop_watch import LoopWatch
+from nmm.runs.measured_state import MeasuredState, Tolerances
 from nmm.runs.pace import keep_pace
 from nmm.runs.trajectory import Trajectory
 
-#: A call so many periods after the one before is late.
-LATE = 1.5
-#: Of its rate the task gets less than that share for so long, s: distances block the robot.
-BLOCKED, BLOCKED_FOR = 0.1, 0.5
-#: Measurements that did not come, or came again, are no fault: a sensor may be slower than the loop.
-QUIET = (Refused.LOST, Refused.REPEATED)
-
-
-class LoopState(StrEnum):
-    """What a `Loop` does: waits for a first measurement, starts softly, runs, holds the inputs where the
-    resolver has none, stops along the limits, has stopped.
-
-    Examples
-    --------
-    >>> robot = nmm.load("unicycle_2r")
-    >>> task = nmm.Task(nmm.Position("ee", "xy"), [1.5, 0.3])
-    >>> limits = nmm.Limits(acceleration=2.0)
-    >>> controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=limits, dt=0.01)
-    >>> nmm.Loop(controller).state is nmm.LoopState.WAITING
-    True
-    """
-
-    WAITING = "waiting"
-    STARTING = "starting"
-    RUNNING = "running"
-    HOLDING = "holding"
-    STOPPING = "stopping"
-    STOPPED = "stopped"
+_STOPS = LoopState.STOPPING, LoopState.STOPPED
 
 
 class Loop:
@@ -83,10 +54,6 @@ class Loop:
     Attributes
     ----------
     state : what it does
-    t : the controller's clock, s since the first call; jumps of the clock are left out
-    q : (n,) where the robot is believed to be
-    u : (m,) the last inputs
-    calls, late_calls : how many there were
     refused : how many measurements were not used, by reason
 
     Raises
@@ -140,25 +107,36 @@ class Loop:
         tolerances = Tolerances(self.watchdog, scalar(lag, "lag", least=0.0), *off, confirm)
         controller.dt = self.period
         controller.solver.load_stop()
-        robot = controller.robot
-        remembered = math.ceil((2.0 * self.watchdog + tolerances.lag) / self.period) + 3
-        self._history = HeldHistory(robot, remembered)
-        self._measured = MeasuredState(robot, self._history, tolerances, self.period)
-        share = math.inf if outside is None else scalar(outside, "outside", least=0.0)
-        self._far = FarLimits(controller.robot, controller.solver.limits_on.coordinates, share)
-        self._error = None if error is None else tuple(positive(most, "error") for most in error)
-        self._units = unit_codes(controller.solver.rows)
-        self._free_at = 0.0
+        self._measured = MeasuredState(controller.robot, tolerances, self.period)
         self._found = LoopFindings(2.5 * self.period)
+        self._watch = LoopWatch(controller, self._found, outside, error)
+        self._clock = LoopClock(self.period, self.watchdog, self._found)
+        self._inputs = LoopInputs(controller, self.period)
         self._log = LoopLog(controller, int(positive(keep, "keep")))
-        self._rest = np.zeros(robot.n_u)
         self.state = LoopState.WAITING
-        self.t, self.u = 0.0, self._rest.copy()
-        self.calls = self.late_calls = 0
-        self.refused: Counter[str] = Counter()
-        self._now, self._offset = math.nan, 0.0
+        self.refused = self._watch.refused
         self._since = self._silent_since = 0.0
         self._why = ""
+
+    @property
+    def t(self) -> float:
+        """The controller's clock, s since the first call; jumps of the clock are left out."""
+        return self._clock.t
+
+    @property
+    def u(self) -> Array:
+        """(m,) the last inputs."""
+        return self._inputs.u
+
+    @property
+    def calls(self) -> int:
+        """How many there were."""
+        return self._clock.calls
+
+    @property
+    def late_calls(self) -> int:
+        """How many came more than half a period late."""
+        return self._clock.late_calls
 
     @property
     def q(self) -> Array:
@@ -182,11 +160,11 @@ class Loop:
 
     def time_of(self, stamp: float) -> float:
         """A time of the clock of `step` on the controller's clock, as for `LiveTarget.set`."""
-        return stamp - self._offset
+        return self._clock.time_of(stamp)
 
     def stop(self, why: str = "asked") -> None:
         """Stop along the limits from the next call on."""
-        if self.state not in (LoopState.STOPPING, LoopState.STOPPED):
+        if self.state not in _STOPS:
             self._found.add("stop_asked", self.t, why=why)
             self._begin_stop("stop_asked")
         if self._measured.at == -math.inf:  # it has not moved yet
@@ -219,96 +197,51 @@ class Loop:
         measured_at : s, when, of the same clock; now unless given
         """
         before = self.t
-        self._tell_time(now)
+        if silence := self._clock.tell(now):
+            self._measured.expect_jump()  # nobody knows what the robot did meanwhile
+            if self.state not in (LoopState.WAITING, LoopState.STOPPED):
+                self._found.add("not_called", self.t, gap=silence)
+                self._begin_stop("not_called")
         self._measured.move_on(before, self.t)
         at = self.t if measured_at is None else self.time_of(measured_at)
         refused, jump = self._measured.take(self.t, q, at)
-        if refused is not None:
-            self.refused[refused] += 1
-            if refused not in QUIET:
-                self._found.add("measurement_refused", self.t, reason=str(refused))
+        self._watch.look_at_measurement(self.t, refused, jump)
         if jump is not None:
-            self._found.add("relocated", self.t, m=jump.m, rad=jump.rad)
             self._start_again()
-        if self._measured.at == -math.inf or (refused is None and self._is_outside()):
+        if refused is None and self.state not in _STOPS and self._watch.is_outside(self.t, self._measured.q):
+            if self.state is LoopState.WAITING:
+                self._measured.forget()
+            else:
+                self._begin_stop("outside_limits")
+        if self._measured.at == -math.inf:
             return self.u.copy()
         if self.state is LoopState.WAITING:
             self.controller.reset()
             self._enter(LoopState.STARTING)
-        elif self.state not in (LoopState.STOPPING, LoopState.STOPPED) and self.age > self.watchdog:
+        elif self.state not in _STOPS and self.age > self.watchdog:
             self._found.add("measurements_ended", self.t, silent=self.age)
             self._begin_stop("measurements_ended")
         self._answer()
         self._log.add(self.t, self._measured.q)
-        self._history.give(self.t, self.u, self.controller.solver.found.q_dot)
+        self._measured.history.give(self.t, self.u, self.controller.solver.found.q_dot)
         return self.u.copy()
-
-    def _tell_time(self, now: float) -> None:
-        """Advance t: by what the clock says, but by a period where it stands, jumps, or nobody called."""
-        self.calls += 1
-        if math.isnan(self._now):
-            if math.isfinite(now):
-                self._now, self._offset = float(now), float(now) - self.t
-            return
-        gap = float(now) - self._now
-        if 0.0 < gap <= self.watchdog:
-            if gap > LATE * self.period:
-                self.late_calls += 1
-                self._found.add("call_late", self.t + gap, math.inf, gap=gap)
-            self.t, self._now = now - self._offset, float(now)
-            return
-        self.t += self.period
-        if not math.isfinite(gap):
-            self._now += self.period
-            self._found.add("clock_jumped", self.t, by=math.inf)
-            return
-        self._now, self._offset = float(now), float(now) - self.t
-        if gap <= 0.0:
-            self._found.add("clock_jumped", self.t, by=gap - self.period)
-            return
-        self.late_calls += 1
-        self._measured.expect_jump()  # nobody knows what the robot did meanwhile
-        if self.state not in (LoopState.WAITING, LoopState.STOPPED):
-            self._found.add("not_called", self.t, gap=gap)
-            self._begin_stop("not_called")
-
-    def _is_outside(self) -> bool:
-        """Whether a joint is measured so far outside its limits that the loop does not start; one that runs
-        begins to stop."""
-        if self.state in (LoopState.STOPPING, LoopState.STOPPED):
-            return False
-        beyond = self._far.beyond(self._measured.q)
-        if not beyond:
-            return False
-        for values in beyond:
-            self._found.add("outside_limits", self.t, **values)
-        if self.state is LoopState.WAITING:
-            self._measured.forget()
-            return True
-        self._begin_stop("outside_limits")
-        return False
 
     def _answer(self) -> None:
         """Inputs for where the robot is believed to be."""
-        solver, q = self.controller.solver, self._measured.q
+        t, q, inputs = self.t, self._measured.q, self._inputs
         if self.state in (LoopState.STARTING, LoopState.RUNNING, LoopState.HOLDING):
-            earlier = solver.before.copy()
-            try:
-                self.u = self.controller(self.t, q)
-            except Exception as error:  # a user's function may raise anything
-                solver.before[:] = earlier
-                self._do_without(type(error).__name__)
+            if raised := inputs.compute(t, q):
+                self._do_without(raised)
             else:
-                self._soften(earlier)
-                self._look_at_task()
+                self._go_on()
         if self.state is LoopState.HOLDING:
-            self._within(lambda: solver.take_nearest(self.t, q, self.u))
-        elif self.state in (LoopState.STOPPING, LoopState.STOPPED):
-            self._within(lambda: solver.take_stop(self.t, q))
+            inputs.hold(t, q)
+        elif self.state in _STOPS:
+            inputs.brake(t, q)
             if self.state is LoopState.STOPPED:
-                self._write(self._rest)
-            elif not self.u.any():
-                self._found.add("stopped", self.t, why=self._why, lasted=self.t - self._since)
+                inputs.rest(q)
+            elif not inputs.u.any():
+                self._found.add("stopped", t, why=self._why, lasted=t - self._since)
                 self._enter(LoopState.STOPPED)
 
     def _do_without(self, why: str) -> None:
@@ -320,58 +253,17 @@ class Loop:
         if self.t - self._silent_since >= self.hold - 1e-9:
             self._begin_stop("resolver_silent")
 
-    def _look_at_task(self) -> None:
-        """Whether distances block the robot, and whether it is off its task."""
-        if self.state is not LoopState.RUNNING:
-            self._free_at = self.t
-            return
-        solver = self.controller.solver
-        if solver.scene is not None and solver.found.answer.nu.min() < BLOCKED:
-            if self.t - self._free_at > BLOCKED_FOR:
-                for pair in self.controller.report.blocking():
-                    self._found.add("blocked", self.t, BLOCKED_FOR, pairs=[pair])
-        else:
-            self._free_at = self.t
-        if self._error is not None:
-            m, rad = norms(solver.found.task.error, self._units)
-            if m > self._error[0] or rad > self._error[1]:
-                self._found.add("off_task", self.t, m=m, rad=rad)
-                self._begin_stop("off_task")
-
-    def _soften(self, earlier: Array) -> None:
-        """Where it has just started, less than what the controller wants."""
-        if self.state is LoopState.HOLDING:
+    def _go_on(self) -> None:
+        """The resolver has an answer: less of it where the robot has just started; a stop off the task."""
+        starting, since = self.state is LoopState.STARTING, self.t - self._since
+        if self.state is LoopState.HOLDING or (starting and since >= self.soft_start):
             self._enter(LoopState.RUNNING)
-        if self.state is not LoopState.STARTING:
-            return
-        if self.t - self._since >= self.soft_start:
-            self._enter(LoopState.RUNNING)
-            return
-        share = (self.t - self._since) / self.soft_start
-        solver, wanted = self.controller.solver, share * self.u
-        solver.before[:] = earlier
-        self._within(lambda: solver.take_nearest(self.t, self._measured.q, wanted))
-
-    def _within(self, take: Callable[[], None]) -> None:
-        """Inputs that the solver brings within the limits; where a function of the user raises, what limits
-        of acceleration allow towards rest."""
-        solver = self.controller.solver
-        earlier = solver.before.copy()
-        try:
-            take()
-            self.u = solver.found.answer.u.copy()
-        except Exception:
-            self.u = np.full_like(earlier, np.nan)
-        if not np.isfinite(self.u).all():
-            change = solver.limits_on.accelerations * self.period
-            self._write(earlier - np.clip(earlier, -change, change))
-
-    def _write(self, u: Array) -> None:
-        """u (m,) in place of the solver's."""
-        solver = self.controller.solver
-        self.u = u.copy()
-        solver.found.answer.u[:] = solver.before[:] = u
-        solver.found.q_dot[:] = solver.robot.S(self._measured.q) @ u
+        elif starting:
+            self._inputs.soften(self.t, self._measured.q, since / self.soft_start)
+        running = self.state is LoopState.RUNNING
+        self._watch.look_for_blocking(self.t, running)
+        if running and self._watch.is_off_task(self.t):
+            self._begin_stop("off_task")
 
     def _enter(self, state: LoopState) -> None:
         self.state, self._since = state, self.t

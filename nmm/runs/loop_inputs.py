@@ -1,0 +1,66 @@
+"""The inputs of a robot's loop, which there are whatever the resolver and a user's functions do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from nmm.arrays import Array
+from nmm.control.controller import Controller
+
+
+class LoopInputs:
+    """u (m,), the last inputs: the controller's, a share of them, held ones or a stop's, within limits."""
+
+    def __init__(self, controller: Controller, period: float) -> None:
+        self._controller, self._solver, self._period = controller, controller.solver, period
+        self._earlier = self._solver.before.copy()
+        self.u = np.zeros(controller.robot.n_u)
+
+    def compute(self, t: float, q: Array) -> str:
+        """Those of the controller at (t, q); what it raised where it has none, and then all is as before."""
+        self._earlier[:] = self._solver.before
+        try:
+            self.u = self._controller(t, q)
+        except Exception as error:  # a user's function may raise anything
+            self._solver.before[:] = self._earlier
+            return type(error).__name__
+        return ""
+
+    def soften(self, t: float, q: Array, share: float) -> None:
+        """A share of those just computed."""
+        self._solver.before[:] = self._earlier
+        wanted = share * self.u
+        self._within(q, lambda: self._solver.take_nearest(t, q, wanted))
+
+    def hold(self, t: float, q: Array) -> None:
+        """The last ones."""
+        self._within(q, lambda: self._solver.take_nearest(t, q, self.u))
+
+    def brake(self, t: float, q: Array) -> None:
+        """Those that stop soonest."""
+        self._within(q, lambda: self._solver.take_stop(t, q))
+
+    def rest(self, q: Array) -> None:
+        self._write(np.zeros_like(self.u), q)
+
+    def _within(self, q: Array, take: Callable[[], None]) -> None:
+        """Inputs that the solver brings within the limits; where a function of the user raises, what limits
+        of acceleration allow towards rest."""
+        earlier = self._solver.before.copy()
+        try:
+            take()
+            self.u = self._solver.found.answer.u.copy()
+        except Exception:
+            self.u = np.full_like(earlier, np.nan)
+        if not np.isfinite(self.u).all():
+            change = self._solver.limits_on.accelerations * self._period
+            self._write(earlier - np.clip(earlier, -change, change), q)
+
+    def _write(self, u: Array, q: Array) -> None:
+        """u (m,) in place of the solver's."""
+        solver = self._solver
+        self.u = u.copy()
+        solver.found.answer.u[:] = solver.before[:] = u
+        solver.found.q_dot[:] = solver.robot.S(q) @ u
