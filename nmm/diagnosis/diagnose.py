@@ -15,7 +15,7 @@ from nmm.diagnosis.reasons import near_singularity
 from nmm.findings import Finding
 from nmm.functions.function import row_scales
 from nmm.runs.clearance import Swept
-from nmm.runs.closed_loop import Leg
+from nmm.runs.leg import Leg
 from nmm.runs.recording import Recorder
 from nmm.runs.trajectory import Trajectory
 from nmm.runs.verdict import Awaited, FindingLine, Outcome, Verdict

@@ -19,7 +19,8 @@ from nmm.diagnosis.assessment import Assessment, Instability, assess
 from nmm.diagnosis.error_bound import Departure, Samples
 from nmm.diagnosis.jumps import chattering, crossings, moving_otherwise
 from nmm.findings import Finding
-from nmm.runs.closed_loop import Leg, record_run, sample_times
+from nmm.runs.leg import Leg
+from nmm.runs.recorded_run import record_run, sample_times
 from nmm.runs.recording import Recorder
 from nmm.runs.residuals import residuals, run_up
 from nmm.runs.verdict import FindingLine, Outcome, Verdict

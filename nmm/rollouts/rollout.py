@@ -23,9 +23,10 @@ from nmm.errors import InputError, expect, no_such
 from nmm.findings.run import line
 from nmm.rollouts.kept import MEASURES, Kept, measure
 from nmm.runs.clearance import guarded
-from nmm.runs.closed_loop import drive_loop, sample_times
+from nmm.runs.closed_loop import drive_loop
 from nmm.runs.disturbances import Disturbances, Plant
 from nmm.runs.disturbed import check_disturbed, drive_disturbed
+from nmm.runs.recorded_run import sample_times
 from nmm.runs.recording import Recorder
 from nmm.runs.simulation import MOST_SAMPLES
 from nmm.runs.verdict import Outcome

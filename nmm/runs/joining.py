@@ -13,7 +13,7 @@ from nmm.control.quantities import QUANTITIES, saved
 from nmm.control.sequence import Schedule
 from nmm.robots.robot import Robot
 from nmm.runs.clearance import Swept, swept
-from nmm.runs.closed_loop import Leg
+from nmm.runs.leg import Leg
 from nmm.runs.residuals import NO_RESIDUALS, Residuals
 from nmm.runs.seen import SeenPoints
 from nmm.runs.shown_frame import shown_frame

@@ -16,10 +16,12 @@ from nmm.control.sequence import Schedule
 from nmm.errors import InputError, RunError, expect_kind
 from nmm.lazy_call import lazy_call
 from nmm.progress import between
-from nmm.runs.closed_loop import Drive, Leaving, Leg, finding_in, record_run, sample_times
+from nmm.runs.closed_loop import finding_in
 from nmm.runs.disturbances import Disturbances, Disturbed
 from nmm.runs.disturbed import check_disturbed, drive_disturbed
 from nmm.runs.joining import join
+from nmm.runs.leg import Leaving, Leg
+from nmm.runs.recorded_run import Drive, record_run, sample_times
 from nmm.runs.recording import Recorder
 from nmm.runs.trajectory import Trajectory
 from nmm.runs.verdict import FindingLine, Outcome
