@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from nmm.errors import ScenarioError
+from nmm.errors import ScenarioError, Setting
 from nmm.files import read_bytes
 from nmm.scenario.keys import is_path
 from nmm.scenario.yaml_text import LONGEST, Place, dotted, read_text
@@ -124,11 +124,9 @@ class Document:
             elif is_path(place):
                 raise ScenarioError(f"{dotted(path)} is {place}: set {place}.{step}", where=where)
             else:
-                raise ScenarioError(
-                    f"{dotted(path)} is {ScenarioError.show(place)}, which has no keys: give it some, "
-                    f"as in --set '{dotted(path)}={{{step}: …}}'",
-                    where=where,
-                )
+                what = f"{dotted(path)} is {ScenarioError.show(place)}, which has no keys"
+                mend = Setting(tuple(map(str, path)), f"{{{step}: …}}")
+                raise ScenarioError(what, where=where, expected="some", mend=mend)
         if isinstance(value, str):
             value = read_text(value, where, lines=False).value
         holder[path[-1]] = _copied(value)
