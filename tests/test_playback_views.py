@@ -364,9 +364,10 @@ def test_a_scenarios_first_view_is_between_heading_and_tools(
     around = Surroundings(camera=(0.0, -4.0, 3.0, 0.0, 0.0, 0.5))
     motion = Motion(robot, motion.t, motion.q, motion.u, surroundings=around)
     points = [[0.0, 0.0, 0.5], [0.0, 0.0, 1.5], [0.0, 0.0, -0.5]]
-    for width in (1280, 420):
-        window.page.set_viewport_size({"width": width, "height": 800})
-        page = window.open(file_url([motion], tmp_path))
+    page = window.open(file_url([motion], tmp_path))
+    for width in (420, 1280, 420):
+        page.set_viewport_size({"width": width, "height": 800})
+        draw_frames(page)
         high, head, tools, bar = page.evaluate(
             """["view", "heading", "tools", "bar"].map((id) => document.getElementById(id))
                .map((part) => part.getBoundingClientRect())

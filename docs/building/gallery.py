@@ -36,7 +36,7 @@ ALONE = """new Promise((done) => {
   nmm.plots.show(false);
   for (const card of document.querySelectorAll(".card")) card.style.display = "none";
   if (nmm.player.time === 0) nmm.player.seek(0.4 * nmm.stage.duration);
-  if (!nmm.camera.moved) nmm.camera.reset();
+  nmm.camera.fit();
   nmm.texts.fit();
   nmm.viewer.set_dirty();
   let left = 3;

@@ -12,7 +12,7 @@
     top: new THREE.Vector3(0, -0.001, 1),
     front: new THREE.Vector3(0, -1, 0.06),
   };
-  const camera = (nmm.camera = { following: false, frozen: false, moved: false, held: null, also: () => [], from: "iso" });
+  const camera = (nmm.camera = { following: false, frozen: false, moved: false, first: null, held: null, also: () => [], from: "iso" });
   const chooser = document.getElementById("from");
   // Not the window: a page may have something beside the view.
   const view = document.getElementById("view");
@@ -54,7 +54,7 @@
     controls.maxPolarAngle = 0.49 * Math.PI;
     extent = size;
     controls.addEventListener("change", planes);
-    controls.addEventListener("start", () => (camera.moved = true));
+    controls.addEventListener("start", () => Object.assign(camera, { moved: true, first: null }));
     controls.addEventListener("end", nmm.address.changed);
     camera.reset();
   };
@@ -190,7 +190,7 @@
   camera.reset = () => {
     if (camera.frozen) return undefined;
     arrange();
-    camera.moved = false;
+    Object.assign(camera, { moved: false, first: null });
     thawed = undefined;
     const towards = upright(TOWARDS[camera.from]);
     const also = camera.also(); // what a page holds besides
@@ -233,7 +233,7 @@
   };
   camera.put = (numbers) => {
     const [from, at] = vectors(numbers);
-    camera.moved = true;
+    Object.assign(camera, { moved: true, first: null });
     lens();
     eye.position.copy(from).sub(at).multiplyScalar(farther()).add(at);
     nmm.viewer.controls.target.copy(at);
@@ -244,7 +244,9 @@
 
   // A scenario's first view: as it was chosen for a wide window; in a narrow one, in what heading and tools leave free.
   camera.open = (numbers) => {
+    arrange();
     camera.put(numbers);
+    camera.first = numbers;
     const [[top, bottom], another] = covered([]);
     if (another) return;
     const { target, update } = nmm.viewer.controls;
@@ -255,6 +257,12 @@
     eye.position.copy(target).add(away);
     update();
     planes();
+  };
+
+  // In a window of another size, where nobody has moved the eye.
+  camera.fit = () => {
+    if (camera.first) camera.open(camera.first);
+    else if (!camera.moved) camera.reset();
   };
 
   // What is held may have left the picture since: then all of it is fitted again, if nobody has moved the eye.

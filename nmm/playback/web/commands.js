@@ -56,7 +56,7 @@ const nmm = (window.nmm = { hooks: {}, geometries: {}, endings: [], ended: false
     nmm.viewer.set_3d_pane_size();
     nmm.scenery.fit();
     nmm.texts.fit();
-    if (nmm.stage && !nmm.camera.moved) nmm.camera.reset();
+    if (nmm.stage) nmm.camera.fit();
     nmm.viewer.set_dirty();
   };
 }
