@@ -178,7 +178,7 @@ def ball_from(page: Page, at: tuple[float, float]) -> float:
 def test_the_ball_stays_under_the_pointer_while_the_robot_drives(
     window: Window, setup: ScenarioSetup
 ) -> None:
-    """For 4 s, of which the robot drives the first ones, with a camera that goes along with it."""
+    """For 10 s, of which the robot drives the first ones, with a camera that goes along with it."""
     with driven(setup) as url:
         page = opened(window, url)
         page.set_viewport_size({"width": 1280, "height": 800})
@@ -193,7 +193,7 @@ def test_the_ball_stays_under_the_pointer_while_the_robot_drives(
         page.mouse.down()
         page.mouse.move(x + 150.0, y + 60.0, steps=6)
         apart, gone, k = [], 0.0, 0
-        while k < 8 or (gone < 0.3 and k < 20):  # longer where the machine is busy
+        while k < 20 or (gone < 0.3 and k < 40):  # longer where the machine is busy
             page.wait_for_timeout(500.0)
             at = (x + 150.0 + k, y + 60.0)
             apart.append(ball_from(page, (at[0] - (k > 0), at[1])))
