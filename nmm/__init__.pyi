@@ -30,6 +30,7 @@ from .errors import NmmError as NmmError
 from .errors import RobotError as RobotError
 from .errors import RunError as RunError
 from .errors import ScenarioError as ScenarioError
+from .errors import Setting as Setting
 from .errors import SingularError as SingularError
 from .findings import Finding as Finding
 from .functions.objectives import Alignment as Alignment

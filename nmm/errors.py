@@ -35,7 +35,13 @@ E = TypeVar("E", bound="NmmError")
 
 @dataclass(frozen=True)
 class Setting:
-    """A key of a scenario, step by step, and a value for it, as YAML; its text is for a shell."""
+    """A key of a scenario, step by step, and a value for it, as YAML; its text is for a shell.
+
+    Examples
+    --------
+    >>> print(nmm.Setting(("resolver", "alpha"), "5"))
+    --set 'resolver.alpha=5'
+    """
 
     path: tuple[str, ...]
     value: str
