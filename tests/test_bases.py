@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from surfaces import coincident, reach_down, surface
 
 from nmm.platforms import Car, DifferentialDrive, Layout, Mecanum, Tractor
-from nmm.robots.loading.measured_joints import measure_layout
+from nmm.robots.loading.measured_joints import Measured, measure_layout
 
 pytestmark = pytest.mark.usefixtures("xacro_each_time")
 
@@ -186,7 +186,7 @@ def test_the_layout_is_what_the_arguments_say(name: str, variant: int) -> None:
 
 
 def layout_of(name: str, variant: int) -> Layout:
-    return measure_layout(model_of(name, variant), (), None, name)
+    return measure_layout(Measured(model_of(name, variant), (), name), None)
 
 
 @each_base

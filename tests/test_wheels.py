@@ -24,7 +24,7 @@ from nmm.playback.keyframes import LARGEST_TURN, ghost_samples, keyframes
 from nmm.playback.placements import Placements, rolling_joints
 from nmm.playback.rolling import Rolling, caster_step
 from nmm.robots.loading import load
-from nmm.robots.loading.measured_joints import measure_layout
+from nmm.robots.loading.measured_joints import Measured, measure_layout
 from nmm.robots.robot import Robot
 from nmm.robots.wheel import Wheel
 
@@ -411,7 +411,7 @@ def test_a_layout_measures_along_the_roots_axes(tmp_path: Path) -> None:
     shoulder = turning("shoulder", "base", "0 0 1", UP)
     text = robot(link("base"), hitch, link("trailer"), wheel, shoulder)
     model = pin.buildModelFromXML(text)
-    layout = measure_layout(model, (), None, "here")
+    layout = measure_layout(Measured(model, (), "here"), None)
     assert [(p.joint, p.carrier, p.lower, p.upper) for p in layout.pivots] == [("hitch", "theta", -1, 1.5)]
     (found,) = layout.wheels
     assert (found.joint, found.carrier) == ("wheel_joint", "hitch")
@@ -426,7 +426,7 @@ def test_a_layout_counts_to_the_left_and_leaves_out_what_is_an_arm() -> None:
         turning("shoulder", "base", "0 0 0.5", UP),
         turning("elbow", "shoulder", "0.3 0 0", LEFT),
     )
-    layout = measure_layout(pin.buildModelFromXML(text), (), None, "here")
+    layout = measure_layout(Measured(pin.buildModelFromXML(text), (), "here"), None)
     assert [(p.joint, p.lower, p.upper) for p in layout.pivots] == [("steering_joint", -math.inf, math.inf)]
     assert layout.wheels == ()
 
@@ -456,7 +456,7 @@ def test_wheels_that_are_none_are_refused(tmp_path: Path, wheels: Any, code: str
     path = write(tmp_path / "robot.urdf", text)
     for call in (
         lambda: load(path, platform=Unicycle(), wheels=wheels),
-        lambda: measure_layout(pin.buildModelFromXML(text), (), wheels, "here"),
+        lambda: measure_layout(Measured(pin.buildModelFromXML(text), (), "here"), wheels),
     ):
         with pytest.raises(RobotError) as caught:
             call()

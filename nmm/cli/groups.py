@@ -117,12 +117,18 @@ class Loading(OfRobot):
     platform: str | None = option(
         "NAME",
         f"How the base moves: {listed(list(PLATFORMS), 'or')}.",
-        show="what the file says, or a car or a unicycle, as its wheels steer",
+        show="what the file says, or its wheels allow",
     )
     axle: str | None = option(
-        "FRAME|X,Y[,Z]",
-        "Where the platform's reference point is in the root link: a frame, or x, y and z in m.",
-        show="the root link's origin",
+        "FRAME|X,Y[,Z[,YAW]]",
+        "Where the platform's reference point is in the root link: a frame, or x, y and z in m and its "
+        "heading in rad (pi/2).",
+        show="amid the wheels that do not steer",
+    )
+    steer: str | None = option(
+        "JOINT,...",
+        "The upright joints that steer.",
+        show="those called so, and those that end on both sides right above their wheels",
     )
     package_dir: list[Path] | None = option(
         "[NAME=]DIR",
@@ -140,6 +146,7 @@ class Loading(OfRobot):
         return super().keywords() | {
             "platform": self.platform,
             "axle": axle_of(self.axle),
+            **({} if self.steer is None else {"steer": names_of(self.steer, "--steer", "JOINT,JOINT,...")}),
             "package_dirs": list(self.package_dir or ()),
             "srdf": self.srdf,
         }

@@ -156,16 +156,17 @@ def wheels_of(given: str | None) -> list[str] | dict[str, float] | None:
 
 
 def axle_of(given: str | None) -> str | list[float] | None:
-    """The `--axle` option: a frame, or x, y (and z), m."""
+    """The `--axle` option: a frame, or x, y (and z), m, and a yaw, rad."""
     if given is None or ("," not in given and any(letter.isalpha() for letter in given)):
         return given
-    expect("," in given, "--axle", "a frame, or X,Y[,Z] in m with commas between", given)
+    expected = "a frame, or X,Y[,Z[,YAW]] in m and rad with commas between"
+    expect("," in given, "--axle", expected, given)
     from nmm.scenario.numbers import evaluate
 
     try:
         return [evaluate(part) for part in given.strip("([ ])").split(",")]
     except InputError as error:
-        raise InputError(error.what, where="--axle", expected="a frame, or X,Y[,Z] in m", got=given) from None
+        raise InputError(error.what, where="--axle", expected=expected, got=given) from None
 
 
 def _pairs(given: Sequence[str] | None, option: str, expected: str) -> list[tuple[str, str]]:

@@ -19,6 +19,7 @@ from nmm.diagnosis.assessment import Assessment, Instability, assess
 from nmm.diagnosis.error_bound import Departure, Samples
 from nmm.diagnosis.jumps import chattering, crossings, moving_otherwise
 from nmm.findings import Finding
+from nmm.robots.wheel_slip import sideways_speeds
 from nmm.runs.leg import Leg
 from nmm.runs.recorded_run import record_run, sample_times
 from nmm.runs.recording import Recorder
@@ -255,6 +256,11 @@ def _unmet(controller: Controller, recorder: Recorder, samples: Samples, dt: flo
     otherwise = moving_otherwise(samples.t, found.q, found.q_dot, robot.q_names, robot.q_units)
     if otherwise is not None:
         yield otherwise
+    sliding = sideways_speeds(robot, found.q, found.q_dot)
+    if sliding:
+        fastest = max(sliding, key=lambda name: sliding[name][1])
+        speeds = {name: speed for name, (_, speed) in sliding.items()}
+        yield Finding("wheels_slid", {"speeds": speeds}, {"t": float(samples.t[sliding[fastest][0]])})
 
 
 def _above_decay(samples: Samples, found: Departure) -> Finding:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from nmm.errors import few
 from nmm.findings.robot_file import placed
-from nmm.text_format import quoted
+from nmm.text_format import listed, quoted
 
 #: Why a presumed wheel joint is none, by `why`.
 NO_WHEEL = {
@@ -36,7 +36,8 @@ _ROLLING = {
     "ahead": "on several axles they cannot all roll in turns: --platform skid_steer "
     '(platform="skid_steer") is made for that, '
     "mecanum or omnidirectional for wheels with rollers",
-    "aside": "they do not roll along the root link's x axis: --axle FRAME (axle=FRAME) gives the direction",
+    "aside": "they do not roll along the x axis: --axle X,Y,Z,YAW (axle=[...]) gives the direction, or leave "
+    "axle and platform to the file",
     "apart": 'they are not parallel: with rollers, --platform omnidirectional (platform="omnidirectional")',
 }
 
@@ -62,18 +63,43 @@ def _base_of_joints(
     return f"{base}in whose place is platform {platform}{left_out}; platform fixed keeps them as coordinates"
 
 
-def _axle_elsewhere(*, root: str, at: Sequence[float], names: Sequence[str], **_: object) -> str:
-    point = ", ".join(f"{value:.4g}" for value in at)
-    return (
-        f"root link {root!r} is not at the wheels' axle, whose midpoint is at ({point}) m in it "
-        f"({few(names)}): give --axle {point.replace(' ', '')} (axle=({point})), or the robot turns about "
-        "the wrong point"
-    )
-
-
 def _posture_beyond(*, posture: str, beyond: Mapping[str, Sequence[float]], **_: object) -> str:
     far = [f"{name} = {value:g} (from {low:g} to {high:g})" for name, (value, low, high) in beyond.items()]
     return f"posture {posture} is outside limits: {few(far)}"
+
+
+#: Why the wheels are those of the platform taken, by `why`.
+_RECOGNIZED = {
+    "axes_meet": "the axes of {names} are not parallel: they have rollers",
+    "rollers": "{names} have rollers",
+    "driven_so": "the file's plugin or name says that {names} have rollers",
+    "hitched": "wheels hang behind {names}",
+    "steered": "{names} steer, otherwise than a car's",
+    "several_axles": "{names} stand on several axles and do not steer, so that they slide in turns; with "
+    'rollers: --platform mecanum (platform="mecanum")',
+    "all_steered": "all wheels are on upright joints ({names}), which turn them anywhere; --platform wheeled "
+    '(platform="wheeled") has these angles as coordinates',
+}
+#: Why wheels do not say what platform they are of, by `why`.
+_UNCLEAR = {
+    "on_swivels": "all wheels swivel freely: {names}",
+    "not_parallel": "wheels that neither steer nor swivel are not parallel: {names}",
+    "several_axles": "wheels on several axles, neither in pairs nor steered: {names}",
+    "steered_otherwise": "what steers fits no platform with these wheels: {names}",
+    "size_unknown": "platform skid_steer needs the wheels' radius, --wheels NAME=METRES,... for all of {names}",
+    "rollers_in_line": "wheels with rollers that cannot move it every way: {names}",
+}
+
+
+def _platform_recognized(*, platform: str, why: str, names: Sequence[str], **_: object) -> str:
+    return f"platform {platform} by its wheels: {_RECOGNIZED[why].format(names=few(names, shown=4))}"
+
+
+def _platform_unclear(*, why: str, names: Sequence[str], commands: Sequence[str], **_: object) -> str:
+    options = listed(commands[:3], "or")
+    return (
+        f"the wheels do not tell the platform: {options}? {_UNCLEAR[why].format(names=few(names, shown=4))}"
+    )
 
 
 WORDS = placed(
@@ -103,17 +129,37 @@ WORDS = placed(
         "not_a_wheel": lambda *, name, why, **given: (
             f"{name} stays a coordinate in spite of its name: {NO_WHEEL[why].format(**given)}"
         ),
-        "taken_for_casters": _names(
-            "each turns a wheel about an upright axis through it and is taken for a caster: {names}; a "
-            'platform that steers: --platform car (platform="car") with "steer" in their names, or one whose '
-            "wheels are described (WheeledPlatform)"
+        "taken_for_casters": lambda *, names, **_: (
+            f"each turns a wheel about an upright axis through it and is taken for a caster: {few(names)}; "
+            f"if they steer: --steer {','.join(names[:2])} (steer={[*names[:2]]!r})"
         ),
         "no_wheel": lambda *, name, why, **given: (
             f"joint {name!r} is no wheel: {NO_WHEEL[why].format(**given)}"
         ),
-        "radius_unknown": "radius of wheel {name!r} not found: its centre is not above the root link's xy "
-        "plane and it has no cylinder or sphere; give it, --wheels {name}=M,... (wheels={{{name!r}: ...}}), "
-        "or no wheels, --wheels none (wheels=())",
+        "radius_unknown": lambda *, names, **_: (
+            f"nothing tells the radius of wheels {few(names)}: they stand still in playback, and limit no "
+            f"speed; give it, --wheels {names[-1]}=METRES,... (wheels={{{names[-1]!r}: ...}})"
+        ),
+        "platform_recognized": _platform_recognized,
+        "platform_unclear": _platform_unclear,
+        "wheels_fixed": _names(
+            "links that are called wheels do not turn in the file ({names}): its root is taken for a "
+            "unicycle, --platform for another"
+        ),
+        "no_wheels": "no wheels in the file: its root link is taken for a unicycle; --platform for another, "
+        "--platform fixed for an arm that stands",
+        "wheels_by_shape": _names("wheels by their shapes, not their names: {names}"),
+        "steering_held": _names("they steer, and stand still at zero: {names}"),
+        "undercarriage_held": lambda *, values, **_: (
+            "between the base and its wheels, standing still: "
+            + few([f"{name} at {value:g}" for name, value in values.items()])
+            + "; --lock NAME=VALUE for another place"
+        ),
+        "tyre_unclear": lambda *, name, middles, **_: (
+            f"the shapes of wheel {name!r} disagree on the middle of its tyre, "
+            f"{', '.join(f'{1e3 * value:.4g}' for value in middles)} mm along its axis from the joint: the "
+            "first counts"
+        ),
         "no_arm": "no arm: the platform is all that moves",
         "nothing_moves": "nothing moves",
         "collision_pairs": "{count} collision pairs: none within a body or across one joint",
@@ -137,20 +183,6 @@ WORDS = placed(
         "wheel_unnamed": "joint {name!r} turns without end about a level axis, with nothing below it: if "
         "it is a wheel, say so with the others, --wheels {name},... (wheels=[{name!r}, ...]); its name "
         'holds no "wheel"',
-        "wheels_not_parallel": _names(
-            "wheels that neither steer nor swivel are not parallel: {names}; with rollers, --platform "
-            'omnidirectional (platform="omnidirectional")'
-        ),
-        "wheels_on_several_axles": _names(
-            "wheels that neither steer nor swivel are not on one axle ({names}): the robot slips in turns; "
-            '--platform skid_steer (platform="skid_steer") takes that as its way of turning, and says how '
-            "fast they slide; mecanum and omnidirectional are for wheels with rollers"
-        ),
-        "axle_turned": _names(
-            "the wheels do not roll along the root link's x axis ({names}); --axle FRAME (axle=FRAME) gives "
-            "the direction"
-        ),
-        "axle_elsewhere": _axle_elsewhere,
         "ground_uneven": lambda *, heights, near, **_: (
             "the wheels do not touch one level ground: "
             + few([f"{name} at z = {z:.4g} m" for name, z in heights.items()])

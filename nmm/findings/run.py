@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from nmm.errors import few
 from nmm.findings.finding import Finding, Words
 from nmm.text_format import counted, listed
 
@@ -125,6 +126,15 @@ def _degrees(angles: Mapping[str, float], **_: Any) -> str:
     return f"the start has {listed(started)}; angles are in rad: {first:g}° is {pi}"
 
 
+def _wheels_slid(speeds: Mapping[str, float], t: float | None = None, **_: Any) -> str:
+    names = few([f"{name} (up to {speed:.3g} m/s)" for name, speed in speeds.items()])
+    at = "" if t is None else f", most at t = {t:.3g} s"
+    return (
+        f"wheels of the robot's file slid sideways{at}: {names}; is its platform what its wheels allow? "
+        "(nmm check)"
+    )
+
+
 def _tips(margin: float | None, edge: Sequence[str], t: float, **_: Any) -> str:
     said = f"the robot tips at t = {t:.4g} s"
     if margin is None:
@@ -156,6 +166,7 @@ WORDS: Mapping[str, Words] = {
         f"blocked by the distance of {', '.join(pairs)}"
         + ("" if end is None else f", from t = {t:.4g} to {end:.4g} s")
     ),
+    "wheels_slid": _wheels_slid,
     "collided": "{name} ran into each other from t = {t:.3g} s on, by up to {depth:.3g} m",
     # The error against its expected decay, and why
     "promise_left": _above_decay,

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
-
-from nmm.errors import InputError
 from nmm.kinds import PLATFORMS as PLATFORMS
 from nmm.platforms.base import Platform as Platform
 from nmm.platforms.car import Car as Car
@@ -31,15 +28,6 @@ from nmm.platforms.wheeled.inputs import WeightedSpins as WeightedSpins
 from nmm.platforms.wheeled.inputs import WheelSpeed as WheelSpeed
 from nmm.platforms.wheeled.inputs import WheelSpin as WheelSpin
 from nmm.platforms.wheeled.platform import WheeledPlatform as WheeledPlatform
-
-
-def usual_platform(layout: Layout | None) -> tuple[Platform, str]:
-    """A car if the file's wheels steer as a car's do ("wheels"), otherwise a unicycle ("default")."""
-    steered = {pivot.joint for pivot in layout.pivots if pivot.steers} if layout is not None else set()
-    if layout is not None and any(wheel.carrier in steered for wheel in layout.wheels):
-        with suppress(InputError):
-            return Car.fit(layout), "wheels"
-    return Unicycle(), "default"
 
 
 def platform_by_name(name: str) -> type[Platform]:

@@ -15,12 +15,12 @@ from nmm.errors import InputError, expect, expect_known
 from nmm.findings import Finding
 from nmm.kernels.compiled import Kernel
 from nmm.platforms.steering import SteeredAxle
-from nmm.platforms.wheel_layout import NEAR, AddedJoint, Layout
+from nmm.platforms.wheel_layout import AddedJoint, Layout
 
 #: The coordinates that every platform begins with.
 PLANAR = ("x", "y", "theta")
-#: Given and measured lengths that differ by a smaller share are the same.
-CLOSE = 0.01
+#: Given and measured lengths that differ by less, m, or by a smaller share are the same.
+CLOSE_LENGTH, CLOSE_SHARE = 1e-3, 0.01
 #: The methods `pfaffian` that `of_many` marked.
 _of_many: set[Callable[[Any, Array], Array]] = set()
 
@@ -126,7 +126,7 @@ class Platform(ABC):
         found = []
         for name, given in self.lengths.items():
             own = measured.get(name, given)
-            if abs(given - own) > max(NEAR, CLOSE * abs(own)):
+            if abs(given - own) > max(CLOSE_LENGTH, CLOSE_SHARE * abs(own)):
                 values = {"platform": self.name, "name": name, "given": given, "measured": own}
                 found.append(Finding("platform_length_differs", values))
         return tuple(found)

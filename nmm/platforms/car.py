@@ -102,7 +102,10 @@ class _Bicycle(Platform):
         midway, `steer`. `InputError` for none, several, or rear wheels that are not at the reference
         point."""
         named = [pivot for pivot in steering_pivots(layout) if abs(pivot.y) <= NEAR < pivot.x]
-        pair = None if named else steered_pair(layout)
+        pair = steered_pair(layout)
+        if pair is not None:  # a joint on the axis speaks for the wheels only where it is midway between them
+            named = [pivot for pivot in named if abs(pivot.x - pair.x) <= NEAR]
+            pair = None if named else pair
         if len(named) != 1 and pair is None:
             expected = 'one steering joint: upright, "steer" in its name, on the x axis of the root, x > 0'
             expected += "; or two with wheels, equally far beside it"

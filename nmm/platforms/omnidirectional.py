@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Mapping, Sequence
 from typing import Self
 
@@ -13,7 +14,16 @@ from nmm.arrays import Array, positive, vector
 from nmm.findings import Finding
 from nmm.kernels.compiled import PLATFORM, compiled, kernel
 from nmm.platforms.base import Platform
-from nmm.platforms.wheel_layout import NEAR, Layout, RollingJoint, described, main_wheels, same, wheels_on
+from nmm.platforms.wheel_layout import (
+    NEAR,
+    Layout,
+    RollingJoint,
+    common_radius,
+    described,
+    main_wheels,
+    same,
+    standing_wheels,
+)
 
 
 @kernel(PLATFORM)
@@ -92,8 +102,8 @@ class Omnidirectional(_Unconstrained):
 
     def compared(self, layout: Layout) -> tuple[Finding, ...]:
         """That the main body stands on one or two wheels, which have to be plain ones: they roll one way."""
-        wheels = wheels_on(layout, "theta")
-        if not 0 < len(wheels) < 3:
+        wheels = standing_wheels(layout)
+        if not 0 < len(wheels) < 3 or layout.drive == self.name:
             return ()
         return (Finding("moves_sideways", {"platform": self.name, "wheels": "; ".join(described(wheels))}),)
 
@@ -158,7 +168,9 @@ class Mecanum(_Unconstrained):
         four, of one radius, that roll forward at the corners of a rectangle around the reference point."""
         expected = "four wheels of one radius that roll forward, in a rectangle around the reference point"
         wheels = main_wheels(layout, cls.name, expected, _why_no_rectangle, 4, 4)
-        return cls(wheels[0].radius, 2.0 * abs(wheels[0].x), 2.0 * abs(wheels[0].y))
+        length = 2.0 * statistics.mean(abs(wheel.x) for wheel in wheels)
+        width = 2.0 * statistics.mean(abs(wheel.y) for wheel in wheels)
+        return cls(common_radius(cls.name, wheels), length, width)
 
     @property
     def parameters(self) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Mapping, Sequence
 from typing import Self
 
@@ -14,7 +15,7 @@ from nmm.errors import expect
 from nmm.kernels.compiled import PLATFORM, kernel
 from nmm.platforms.base import Platform, of_many
 from nmm.platforms.unicycle import across
-from nmm.platforms.wheel_layout import NEAR, Layout, RollingJoint, main_wheels, same
+from nmm.platforms.wheel_layout import NEAR, Layout, RollingJoint, common_radius, main_wheels, same
 
 
 @kernel(PLATFORM)
@@ -113,7 +114,8 @@ class SkidSteer(Platform):
         expected += ", with the reference point in their middle"
         wheels = main_wheels(layout, cls.name, expected, _why_no_two_sides, 4)
         length = max(wheel.x for wheel in wheels) - min(wheel.x for wheel in wheels)
-        return cls(wheels[0].radius, length, 2.0 * abs(wheels[0].y))
+        width = 2.0 * statistics.mean(abs(wheel.y) for wheel in wheels)
+        return cls(common_radius(cls.name, wheels), length, width)
 
     @property
     def parameters(self) -> Array:
@@ -145,7 +147,7 @@ def _why_no_two_sides(wheels: Sequence[RollingJoint]) -> str | None:
     if not same(abs(wheel.y) for wheel in wheels) or abs(wheels[0].y) <= NEAR:
         return "they are not equally far to the left and right of the reference point: give axle (--axle X,Y)"
     left, right = (sorted(wheel.x for wheel in wheels if wheel.y * side > 0.0) for side in (1.0, -1.0))
-    if len(left) != len(right) or any(abs(a - b) > NEAR for a, b in zip(left, right, strict=True)):
+    if len(left) != len(right) or any(abs(a - b) > 2 * NEAR for a, b in zip(left, right, strict=True)):
         return "they do not stand in pairs, one to the left and one to the right"
     if left[-1] - left[0] <= NEAR:
         return "they are on one axle"

@@ -18,6 +18,7 @@ from nmm.platforms.wheel_layout import (
     Layout,
     RollingJoint,
     ahead,
+    common_radius,
     main_wheels,
     same,
     steered_too_little,
@@ -135,7 +136,7 @@ class DifferentialDrive(Unicycle):
         one radius, that roll forward on an axle through the reference point."""
         expected = "two wheels of one radius that roll forward on an axle through the reference point"
         wheels = main_wheels(layout, cls.name, expected, _why_no_axle, 2, 2)
-        return cls(wheels[0].radius, abs(wheels[0].y - wheels[1].y))
+        return cls(common_radius(cls.name, wheels), abs(wheels[0].y - wheels[1].y))
 
     @property
     def parameters(self) -> Array:

@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 from nmm.errors import InputError
 from nmm.findings import Finding
 
-#: Two lengths (m) or angles (rad) of a robot's file that differ by less are meant to be the same.
-NEAR = 1e-3
+#: Lengths of a robot's file that differ by less, m, are meant to be the same: files round, and drawings lie.
+NEAR = 5e-3
+#: The same of directions, rad: files say 3.14 for pi, and real wheels have some toe and camber.
+PARALLEL = 0.02
+#: The coordinate that turns the main body, by which its joints name their carrier.
+MAIN_BODY = "theta"
 #: Parts of an upright joint's name, in lower case, that say what it is.
 STEERING = ("steer",)
 HITCHES = ("hitch", "trailer")
-SWIVELS = ("caster", "swivel")
+SWIVELS = ("caster", "castor", "swivel")
+#: What an upright joint does on the ground.
+Role = Literal["", "steering", "hitch", "swivel"]
+#: What a wheel has on its rim: nothing, rollers about its rolling direction, or rollers at 45 degrees.
+Rollers = Literal["", "omni", "mecanum"]
 
 
 @dataclass(frozen=True)
@@ -28,6 +38,7 @@ class Pivot:
     x, y : its axis in the carrier's frame, at zero, m
     lower, upper : its limits, rad (infinite without)
     velocity : its largest rate, rad/s (infinite without)
+    role : "steering", "hitch", "swivel"; "" for what its name says
 
     Examples
     --------
@@ -43,16 +54,17 @@ class Pivot:
     lower: float
     upper: float
     velocity: float = math.inf
+    role: Role = ""
 
     @property
     def steers(self) -> bool:
-        """Whether its name says that it steers."""
-        return any(word in self.joint.lower() for word in STEERING)
+        """Whether it steers."""
+        return self.role == "steering" if self.role else is_named(self.joint, STEERING)
 
     @property
     def hitches(self) -> bool:
-        """Whether its name says that it carries a trailer."""
-        return any(word in self.joint.lower() for word in HITCHES)
+        """Whether it carries a trailer."""
+        return self.role == "hitch" if self.role else is_named(self.joint, HITCHES)
 
 
 @dataclass(frozen=True)
@@ -63,9 +75,11 @@ class RollingJoint:
     ----------
     joint : its name
     carrier : name of the movable joint that carries it; "theta" for the root link's body
-    x, y : the wheel's centre in the carrier's frame, at zero, m
+    x, y : the middle of its tyre in the carrier's frame, at zero, m
     heading : direction in which it rolls when it turns in the positive sense, from the carrier's x axis, rad
-    radius : m
+    radius : m; NaN where the file does not tell
+    rollers : "omni" or "mecanum" where the file shows such rollers, else ""
+    touches : whether it touches the ground of the lowest one
 
     Examples
     --------
@@ -80,12 +94,15 @@ class RollingJoint:
     y: float
     heading: float
     radius: float
+    rollers: Rollers = ""
+    touches: bool = True
 
 
 @dataclass(frozen=True)
 class Layout:
     """The pivots and wheels of a robot. x and y count from the platform's reference point (see `load`'s
-    `axle`) on the body that "theta" carries, and from the joint's own frame on any other.
+    `axle`) on the body that "theta" carries, and from the joint's own frame on any other. `drive` is what a
+    simulator's plugin in the file drives the base as: "mecanum", "skid_steer", "" where none says.
 
     Examples
     --------
@@ -100,6 +117,26 @@ class Layout:
     robot: str
     pivots: tuple[Pivot, ...] = ()
     wheels: tuple[RollingJoint, ...] = ()
+    drive: str = ""
+
+    def moved(self, x: float, y: float, yaw: float) -> Layout:
+        """The same seen from (x, y) m and yaw (rad) on the main body."""
+
+        def place(part: Pivot | RollingJoint) -> tuple[float, float]:
+            if part.carrier == MAIN_BODY:
+                at = complex(part.x - x, part.y - y) * back
+            else:  # frames of other bodies lie along the main body's
+                at = complex(part.x, part.y) * back
+            return at.real, at.imag
+
+        back = cmath.rect(1.0, -yaw)
+        pivots = [replace(one, x=at[0], y=at[1]) for one in self.pivots for at in (place(one),)]
+        wheels = [
+            replace(one, x=at[0], y=at[1], heading=math.remainder(one.heading - yaw, 2.0 * math.pi))
+            for one in self.wheels
+            for at in (place(one),)
+        ]
+        return replace(self, pivots=tuple(pivots), wheels=tuple(wheels))
 
 
 @dataclass(frozen=True)
@@ -128,17 +165,30 @@ class AddedJoint:
     velocity: float
 
 
+def is_named(joint: str, words: Iterable[str]) -> bool:
+    """Whether a name holds one of the words."""
+    return any(word in joint.lower() for word in words)
+
+
 def wheels_on(layout: Layout, carrier: str) -> tuple[RollingJoint, ...]:
     return tuple(wheel for wheel in layout.wheels if wheel.carrier == carrier)
 
 
+def standing_wheels(layout: Layout) -> tuple[RollingJoint, ...]:
+    """The main body's wheels on the ground that neither steer nor swivel; those called casters, and those
+    with rollers beside plain ones, only where there are no others: they constrain nothing."""
+    wheels = tuple(wheel for wheel in wheels_on(layout, MAIN_BODY) if wheel.touches)
+    wheels = tuple(wheel for wheel in wheels if not is_named(wheel.joint, SWIVELS)) or wheels
+    return tuple(wheel for wheel in wheels if not wheel.rollers) or wheels
+
+
 def steering_pivots(layout: Layout) -> list[Pivot]:
-    return [pivot for pivot in layout.pivots if pivot.steers and pivot.carrier == "theta"]
+    return [pivot for pivot in layout.pivots if pivot.steers and pivot.carrier == MAIN_BODY]
 
 
 def rolls_forward(wheel: RollingJoint) -> bool:
     """Whether it rolls along its carrier's x axis, in either direction."""
-    return abs(math.sin(wheel.heading)) <= NEAR
+    return abs(math.sin(wheel.heading)) <= PARALLEL
 
 
 def stands_below(wheel: RollingJoint) -> bool:
@@ -147,14 +197,15 @@ def stands_below(wheel: RollingJoint) -> bool:
 
 
 def same(values: Iterable[float]) -> bool:
-    values = list(values)
-    return max(values) - min(values) <= NEAR
+    """Whether lengths, m, are meant to be one; those that are unknown (NaN) aside."""
+    known = [value for value in values if not math.isnan(value)]
+    return not known or max(known) - min(known) <= NEAR
 
 
 def symmetric_limit(pivot: Pivot) -> float | None:
     """The pivot's largest angle (rad) when its limits are finite and the same on both sides."""
-    even = math.isfinite(pivot.upper) and pivot.upper > 0.0 and abs(pivot.lower + pivot.upper) <= NEAR
-    return pivot.upper if even else None
+    even = math.isfinite(pivot.upper) and pivot.upper > 0.0 and abs(pivot.lower + pivot.upper) <= PARALLEL
+    return min(-pivot.lower, pivot.upper) if even else None
 
 
 def described(parts: Iterable[Pivot | RollingJoint]) -> list[str]:
@@ -166,7 +217,8 @@ def described(parts: Iterable[Pivot | RollingJoint]) -> list[str]:
             found.append(f"{text} on {part.carrier}")
             continue
         turned = "" if rolls_forward(part) else f" rolling at {math.degrees(part.heading):.4g} degrees"
-        found.append(f"{text}{turned}, radius {_m(part.radius)} m")
+        radius = "unknown" if math.isnan(part.radius) else f"{_m(part.radius)} m"
+        found.append(f"{text}{turned}, radius {radius}")
     return found
 
 
@@ -197,7 +249,7 @@ def main_wheels(
     most: float = math.inf,
 ) -> tuple[RollingJoint, ...]:
     """The root body's `least` to `most` wheels, forward, of one radius; `misfit` if not, or by `why_not`."""
-    wheels = wheels_on(layout, "theta")
+    wheels = standing_wheels(layout)
     turned = [wheel.joint for wheel in wheels if not rolls_forward(wheel)]
     if not least <= len(wheels) <= most:
         wrong: str | None = f"the root's body carries {len(wheels)}"
@@ -210,9 +262,22 @@ def main_wheels(
     return wheels
 
 
+def common_radius(platform: str, wheels: Sequence[RollingJoint]) -> float:
+    """The wheels' radius, m; `InputError` where none is known."""
+    known = [wheel.radius for wheel in wheels if not math.isnan(wheel.radius)]
+    if not known:
+        expected = (
+            "the wheels' radius, for its inputs are their speeds: --wheels NAME=METRES,... (wheels={...})"
+        )
+        raise InputError(
+            "no wheel has a shape that tells it", where=f"platform {platform}", expected=expected
+        )
+    return known[0]
+
+
 def check_axle(layout: Layout, platform: str) -> None:
     """`InputError` if forward-rolling wheels on the root's body have their axle off the reference point."""
-    wheels = [wheel for wheel in wheels_on(layout, "theta") if rolls_forward(wheel)]
+    wheels = [wheel for wheel in standing_wheels(layout) if rolls_forward(wheel)]
     if wheels and all(abs(wheel.x) > NEAR for wheel in wheels):
         expected = "its reference point on the axle of wheels that do not steer"
         nearest = min(wheels, key=lambda wheel: abs(wheel.x))

@@ -58,7 +58,7 @@ def _point(value: object, sizes: tuple[int, ...], expected: str) -> object:
 def _axle(value: object) -> object:
     if value is None or isinstance(value, str):
         return value
-    return _point(value, (2, 3), "a frame, [x, y] or [x, y, z]")
+    return _point(value, (2, 3, 4), "a frame, [x, y], [x, y, z] or [x, y, z, yaw]")
 
 
 def _kind_of_platform(value: object) -> object:
@@ -100,7 +100,7 @@ class RobotPart(Part):
     platform: Annotated[str | dict[str, Any] | None, BeforeValidator(_kind_of_platform)] = Field(
         None,
         description="a kind (car), measured in the file, or {kind: car, wheelbase: 0.5}; by default "
-        "what the file declares, else a car or a unicycle, as its wheels steer",
+        "what the file declares, else what its wheels allow",
     )
     package_dirs: list[FileName] = Field(
         default_factory=list,
@@ -117,8 +117,13 @@ class RobotPart(Part):
     )
     axle: Annotated[str | list[float] | None, BeforeValidator(_axle)] = Field(
         None,
-        description="the platform's reference point in the root link: a frame, [x, y] or [x, y, z], "
-        "m; by default its origin",
+        description="the platform's reference point in the root link: a frame, or [x, y, z, yaw], m and rad, "
+        "whose last may be left out; by default amid the wheels that do not steer",
+    )
+    steer: list[str] = Field(
+        default_factory=list,
+        description="upright joints that steer; by default those called so, and those that end on both sides "
+        "right above their wheels",
     )
     limits: dict[str, Number] = Field(
         default_factory=dict, description="largest absolute values of the platform's inputs: {v: 0.5}"

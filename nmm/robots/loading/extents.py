@@ -10,23 +10,19 @@ from nmm.arrays import Array
 
 def has_width(shape: pin.GeometryObject) -> bool:
     """Whether `width` measures it: boxes have no radius."""
-    return len(_points(shape.geometry)[0]) > 0
+    return len(points_of(shape.geometry)[0]) > 0
 
 
-def width(shape: pin.GeometryObject, along: Array) -> float:
-    """How far (m) a shape reaches from an axis through its joint's origin where it reaches least: the radius
-    of a wheel, also of one that a box stands for."""
-    points, around = _points(shape.geometry)
-    if not len(points):
-        return 0.0
-    placed = points @ shape.placement.rotation.T + shape.placement.translation
+def width(points: Array, along: Array) -> float:
+    """How far (m) points (k, 3) reach from an axis through the origin where they reach least: the radius of a
+    wheel, also of one that a box stands for."""
     across = np.linalg.svd(along[np.newaxis])[2][1:]  # two directions at right angles to the axis
     turns = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
     ways = np.column_stack([np.cos(turns), np.sin(turns)]) @ across
-    return float((placed @ ways.T).max(axis=0).min()) + around
+    return float((points @ ways.T).max(axis=0).min())
 
 
-def _points(geometry: Any) -> tuple[Array, float]:
+def points_of(geometry: Any) -> tuple[Array, float]:
     """Points (k, 3) of a shape, m, and the radius of balls about them that fill it; none of a box."""
     match type(geometry).__name__:
         case "Sphere":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -10,20 +11,17 @@ import pinocchio as pin
 
 from nmm.arrays import Array
 from nmm.findings import Finding
-from nmm.platforms.wheel_layout import HITCHES, SWIVELS
+from nmm.platforms.wheel_layout import HITCHES, PARALLEL
 from nmm.robots.loading.extents import has_width
 from nmm.robots.loading.measured_joints import ROUNDED, Measured
 from nmm.robots.robot import Robot
 from nmm.robots.wheel import Wheel
+from nmm.robots.wheel_slip import plain_wheels
 
 #: Lowest points that differ by no more than this, m, are on one ground: so much do casters give way.
 LEVEL = 5e-3
 #: In the name of a frame that is on the ground (REP-120).
 FOOTPRINT = "footprint"
-#: How far the axle's midpoint may be from the reference point, m.
-NEAR = 2e-3
-#: How far two directions may differ, rad.
-PARALLEL = 1e-3
 
 
 @dataclass(frozen=True)
@@ -65,9 +63,8 @@ class Ground:
         x, y, z = self.reference.act(np.array([0.0, 0.0, self.z])) + 0.0
         z = 0.0 if abs(z) <= self.near else z  # as without a reference point of its own
         touching = f"the wheels touch it at z = {z:.4g} m in link {root!r}"
-        if abs(self.reference.rotation[1, 0]) > PARALLEL:
-            return f"{touching}; heights count from the ground where the axle's frame is there"
-        at = f"{x:.6g},{y:.6g},{z:.4g}"
+        yaw = math.atan2(self.reference.rotation[1, 0], self.reference.rotation[0, 0])
+        at = f"{x:.6g},{y:.6g},{z:.4g}{f',{yaw:.6g}' if abs(yaw) > PARALLEL else ''}"
         spaced = at.replace(",", ", ")
         return f"{touching}; heights count from the ground with --axle {at} (axle=({spaced}))"
 
@@ -104,12 +101,26 @@ def _has_shape(robot: Robot, wheel: Wheel) -> bool:
     )
 
 
-def wheel_advice(robot: Robot, root: str) -> list[Finding]:
+#: Notes of loading that a user should know before a first run.
+_ADVICE = (
+    *(
+        "platform_recognized",
+        "no_wheels",
+        "wheels_fixed",
+        "wheels_by_shape",
+        "not_a_wheel",
+        "taken_for_casters",
+    ),
+    *("undercarriage_held", "steering_held", "radius_unknown", "tyre_unclear", "wheels_slide"),
+)
+
+
+def wheel_advice(robot: Robot) -> list[Finding]:
     """Warnings about the wheels of a robot."""
     if not robot.platform.coordinates:
         return []
-    notes = [note for note in robot.notes if note.code in ("not_a_wheel", "taken_for_casters")]
-    return [*notes, *_hitches(robot), *_nameless(robot), *_about_axle(robot, root)]
+    notes = [note for note in robot.notes if note.code in _ADVICE]
+    return [*notes, *_hitches(robot), *_nameless(robot)]
 
 
 def _hitches(robot: Robot) -> Iterator[Finding]:
@@ -130,29 +141,6 @@ def _nameless(robot: Robot) -> Iterator[Finding]:
             yield Finding("wheel_unnamed", {"name": name})
 
 
-def _about_axle(robot: Robot, root: str) -> Iterator[Finding]:
-    """Where the axle is of wheels that neither steer nor swivel nor have rollers."""
-    fixed = _only_rolling(robot)
-    if not fixed:
-        return
-    names = {"names": [wheel.joint for wheel in fixed]}
-    along = _rolling(fixed)
-    if along is None:
-        yield Finding("wheels_not_parallel", names)
-        return
-    if abs(along[1]) > PARALLEL:
-        yield Finding("axle_turned", names)
-    ahead = np.array([along @ wheel.center[:2] for wheel in fixed])
-    if np.ptp(ahead) > NEAR:
-        yield Finding("wheels_on_several_axles", names)
-        return
-    centers = [wheel.center[:2] for wheel in fixed]
-    middle = 0.5 * (np.min(centers, axis=0) + np.max(centers, axis=0))
-    if np.linalg.norm(middle) > NEAR:
-        at = _reference(robot).act(np.append(middle, 0.0)) + 0.0
-        yield Finding("axle_elsewhere", {"root": root, "at": at[: 3 if at[2] else 2].tolist(), **names})
-
-
 def _rolling(wheels: list[Wheel]) -> Array | None:
     """The way (2,) that wheels roll; None where they are not parallel."""
     axis = wheels[0].axis[:2] / np.linalg.norm(wheels[0].axis[:2])
@@ -162,19 +150,13 @@ def _rolling(wheels: list[Wheel]) -> Array | None:
 
 
 #: Sideways speeds of a wheel below this, for an input of 1 m/s or 1 rad/s, are the file's rounding.
-SLACK = 1e-3
-
-
-def _only_rolling(robot: Robot) -> list[Wheel]:
-    """The root link's fixed wheels without rollers; none where wheels slide by the platform's design."""
-    platform = robot.platform
-    by_design = platform.p > 2 or np.any(platform.sliding(np.eye(platform.p)))  # three inputs: rollers
-    return [] if by_design else [wheel for wheel in robot.wheels if wheel.is_fixed]
+SLACK = 5e-3
 
 
 def slipping_wheels(robot: Robot) -> dict[str, float]:
     """Wheels whose axle misses the reference point: their largest sideways speed for an input of 1, m/s."""
-    platform, plain = robot.platform, _only_rolling(robot)
+    platform = robot.platform
+    plain = [wheel for wheel in plain_wheels(robot) if wheel.is_fixed]
     if not plain or platform.n_p < 3:
         return {}
     own = platform.coordinate_limits[3:]
@@ -195,30 +177,12 @@ def slipping_wheels(robot: Robot) -> dict[str, float]:
     return found
 
 
-def steered_casters(robot: Robot) -> list[Finding]:
-    """Swivels right above their wheels, as steered wheels have them: for a platform that steers none."""
-    names = [
-        wheel.swivel
-        for wheel in robot.wheels
-        if wheel.swivel
-        and not any(word in wheel.swivel.lower() for word in SWIVELS)
-        and _trail(wheel) <= NEAR
-    ]
-    return [Finding("taken_for_casters", {"names": names})] if names else []
-
-
-def _trail(wheel: Wheel) -> float:
-    """How far a wheel's contact is before or behind its swivel's axis, m."""
-    x, y = wheel.center[:2] - wheel.pivot[:2]
-    return abs(float(x * wheel.axis[1] - y * wheel.axis[0]))
-
-
 def slip_warnings(robot: Robot) -> list[Finding]:
     """The wheels that slide, if there are any."""
     slipping = slipping_wheels(robot)
     if not slipping:
         return []
-    plain = _only_rolling(robot)
+    plain = [wheel for wheel in plain_wheels(robot) if wheel.is_fixed]
     along = _rolling(plain)
     several = along is None or bool(np.ptp([along @ wheel.center[:2] for wheel in plain]) > SLACK)
     roll = "apart" if along is None else "aside" if abs(along[1]) > PARALLEL else "ahead"

@@ -9,7 +9,7 @@ from typing import Literal
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from nmm.errors import RobotError, expect_kind
+from nmm.errors import RobotError, expect_kind, one_or_several
 from nmm.platforms import Platform, platform_by_name
 from nmm.robots.loading.models import Options, robot_from
 from nmm.robots.loading.packages import PACKAGE, package_file
@@ -27,6 +27,7 @@ def load(
     wheels: Sequence[str] | Mapping[str, float] | None = None,
     lock: Mapping[str, float] | None = None,
     axle: str | ArrayLike | None = None,
+    steer: Sequence[str] = (),
     name: str | None = None,
     limits: Mapping[str, float] | None = None,
     missing_meshes: Literal["error", "skip"] = "error",
@@ -36,10 +37,11 @@ def load(
 ) -> Robot:
     """Load a mobile manipulator, or an arm that is put on a platform.
 
-    The robot gets the coordinates x, y (m) and theta (rad, not wrapped) above its root link, which is the
-    platform's reference point (REP-103: x forward, z up; on the ground, midway between the wheels) unless
-    `axle` says where that is. A platform without coordinates is a fixed base. Continuous joints become one
-    unbounded angle. Wheels that only roll are no coordinates. A joint that follows another
+    The robot gets the coordinates x, y (m) and theta (rad, not wrapped) of the platform's reference point
+    (REP-103: x forward, z up): midway between the wheels that neither steer nor swivel, or the root link
+    where there are none, unless `axle` says where it is. A platform without coordinates is a fixed base.
+    Continuous joints become one unbounded angle. Wheels that only roll are no coordinates; springs, rockers
+    and legs between base and wheels stand still at zero (`lock` them elsewhere). A joint that follows another
     (<mimic>) stays a coordinate and has no input of its own; one that follows a locked joint stands still.
 
     Parameters
@@ -49,17 +51,20 @@ def load(
         (which is replaced), or with joints x, y, theta first
     arguments : values of the xacro file's arguments
     platform : the platform, or its name, by which it is measured in the file; by default what the file
-        declares, `<nmm platform="car"/>` below <robot>, or a car where two wheels, or one, steer as a car's
-        do, or else a unicycle
+        declares, `<nmm platform="car"/>` below <robot>, or what its wheels allow (docs/platforms.md); a
+        unicycle without wheels
     package_dirs : folders that are, or hold, the ROS packages that the file speaks of; "NAME=FOLDER" is that
         of the package NAME
-    wheels : joints that only roll, or the radius (m) of each; `()` for none. By default those with "wheel"
-        in the joint's or link's name, with a level axis and no joint below them; on a fixed base they
-        stand still
+    wheels : joints that only roll, or the radius (m) of each; `()` for none. By default those with a level
+        axis and no joint below them (but rollers) that have "wheel" in the joint's or link's name, or turn
+        without end on the base, are round and touch the ground; on a fixed base they stand still
     lock : joints to fix, and their values (rad or m), within their limits; joints that follow them are fixed
         with them, and one that is fixed itself follows none. A name with * (any letters) or ? (one) stands
         for all joints that match and that no other key names: {"*finger*": 0}
-    axle : the platform's reference point in the root link: a frame, whose yaw counts too, or x, y(, z) in m
+    axle : the platform's reference point in the root link: a frame, whose yaw counts too, or x, y(, z) in m,
+        and its yaw in rad behind them
+    steer : upright joints that steer; by default those called so, and those that end on both sides, right
+        above their wheels, beside wheels that do not steer
     name : the robot's name; by default that of the file or model
     limits : largest absolute values of the platform's inputs, by name, in their units
     missing_meshes : "error", or "skip" to leave out, with a note, the shapes whose mesh is not there
@@ -97,7 +102,15 @@ def load(
             raise RobotError(where=argument, expected=expected, got=given)
     if isinstance(srdf, str) and srdf.startswith(PACKAGE):
         srdf = package_file(srdf, folders)
-    options = Options(platform, wheels, lock or {}, axle, name, limits or {})
+    options = Options(
+        platform,
+        wheels,
+        lock or {},
+        axle,
+        one_or_several(steer, str, "steer", "names of joints"),
+        name,
+        limits or {},
+    )
     if isinstance(source, pin.Model):
         if arguments or folders:
             raise RobotError("they are for files, not for a pin.Model", where="arguments, package_dirs")

@@ -10,22 +10,26 @@ from numpy.typing import ArrayLike
 from nmm.arrays import array
 from nmm.errors import InputError, RobotError, expect_known
 from nmm.findings import Finding
-from nmm.platforms import AddedJoint, FixedBase, Layout, Platform, platform_by_name, usual_platform
+from nmm.platforms import AddedJoint, FixedBase, Layout, Platform, platform_by_name
+from nmm.platforms.recognition import AT_ROOT, Pose, recognized, reference_of
 from nmm.robots.loading.chain import CHAIN, Rebuilt, rebuild
-from nmm.robots.loading.ground import slip_warnings, steered_casters
+from nmm.robots.loading.ground import slip_warnings
 from nmm.robots.loading.locking import Locked, add_pairs, among_coordinates, at_zero, limit_notes, with_locked
 from nmm.robots.loading.measured_joints import (
     Asked,
     Measured,
     differing_radii,
+    differing_tyres,
     find_wheels,
     held_joints,
     measure_layout,
     speed_limit,
+    without_radius,
 )
 from nmm.robots.loading.provenance import Parts
 from nmm.robots.loading.source import Source
 from nmm.robots.loading.virtual_base import VirtualBase, find_virtual_base
+from nmm.robots.loading.wheel_search import find_undercarriage
 from nmm.robots.robot import Robot
 from nmm.robots.wheel import Wheel
 
@@ -41,13 +45,15 @@ class Options:
     wheels: Asked = None
     lock: Mapping[str, float] = field(default_factory=dict)
     axle: str | ArrayLike | None = None
+    steer: Sequence[str] = ()
     name: str | None = None
     limits: Mapping[str, float] = field(default_factory=dict)
     add_pairs: AddPairs | None = None
 
 
 def robot_from(source: Source, options: Options) -> Robot:
-    """`RobotError` for an unusable joint, an unknown joint or frame, a platform that does not fit."""
+    """`RobotError` for an unusable joint, an unknown joint or frame, a platform that does not fit, wheels
+    that leave open how they drive."""
     where, is_fixed = source.where, _is_fixed(source, options)
     rebuilt = rebuild(source.model, (source.visual_model, source.collision_model), where)
     rebuilt.model.name = options.name or source.name
@@ -55,41 +61,62 @@ def robot_from(source: Source, options: Options) -> Robot:
     made = with_locked(rebuilt, options.lock, source.mimic_joints, where, stated)
     base = find_virtual_base(made.rebuilt.model, where)
     if base is not None and not is_fixed:
-        made = _standing(made, base.joints, where)
-    rebuilt = made.rebuilt
+        made = _standing(made, dict.fromkeys(base.joints, 0.0), where)
+    undercarriage = find_undercarriage(_measured(made, source), options.wheels, stated)
+    if undercarriage.held:
+        made = _standing(made, undercarriage.held, where)
+    source = replace(source, undercarriage=undercarriage)
     if options.axle is not None:
-        placement = _axle_placement(rebuilt.model, options.axle, where)
-        moved = rebuild(rebuilt.model, rebuilt.geometries, where, root=placement.inverse())
-        reached = {"at": placement.translation.tolist(), "yaw": _yaw(placement)}
-        rebuilt = replace(moved, notes=(*rebuilt.notes, Finding("reference_moved", reached)))
-    platform, origin, layout, contradictions = _platform(rebuilt, source, options, base)
+        made = _moved(made, _axle_placement(made.rebuilt.model, options.axle, where), where)
+    chosen = _platform(made, source, options, base)
+    platform, layout = chosen.platform, chosen.layout
+    if options.axle is None and chosen.reference != AT_ROOT:
+        x, y, yaw = chosen.reference
+        made = _moved(made, pin.SE3(pin.utils.rotate("z", yaw), np.array([x, y, 0.0])), where)
     if options.limits:
         try:
             platform = platform.with_limits(options.limits)
         except InputError as error:
             raise error.at(where, RobotError) from None
-    made = _turned_up(replace(made, rebuilt=rebuilt), platform, where)
-    rebuilt = made.rebuilt
-    remarks = [*contradictions]
+    made = _turned_up(made, platform, where)
+    remarks = [*undercarriage.notes(), *chosen.remarks]
     if base is not None:
         platform = base.limited(platform)
         remarks.append(base.note(platform))
+    rebuilt = made.rebuilt
     added = None if layout is None else platform.added_joint(layout)
     if added is not None:
         rebuilt = _with_joint(rebuilt, added, where)
     own = _own_joints(platform, rebuilt.model, made.values, where)
     made = replace(made, rebuilt=_on_platform(rebuilt, platform, own, where))
     if not platform.coordinates:
-        made = _with_held_wheels(made, options.wheels, where)
+        made = _with_held_wheels(made, options.wheels, source)
+    elif layout is not None:
+        made, more = _with_idle_parts_held(made, layout, own, source)
+        remarks += more
     provenance = replace(
         source.provenance,
         locked=made.values,
         mimicked=made.mimicked,
-        platform=origin,
-        contradictions=contradictions,
+        platform=chosen.origin,
+        contradictions=chosen.contradictions,
     )
     parts = Parts(made.rebuilt.geometries[1], (*source.notes, *made.rebuilt.notes, *remarks), provenance)
     return _without_wheels(made, platform, own, source, options, parts)
+
+
+def _measured(made: Locked, source: Source) -> Measured:
+    visual, collision = made.rebuilt.geometries
+    return Measured(made.rebuilt.model, (collision, visual), source.where, source.marks, source.undercarriage)
+
+
+def _moved(made: Locked, placement: pin.SE3, where: str) -> Locked:
+    """The model whose coordinates are of the point and x axis of `placement`, in the root link."""
+    rebuilt = made.rebuilt
+    moved = rebuild(rebuilt.model, rebuilt.geometries, where, root=placement.inverse())
+    reached = {"at": (placement.translation + 0.0).tolist(), "yaw": _yaw(placement)}
+    notes = (*rebuilt.notes, Finding("reference_moved", reached))
+    return replace(made, rebuilt=replace(moved, notes=notes))
 
 
 def _axle_placement(model: pin.Model, axle: str | ArrayLike, where: str) -> pin.SE3:
@@ -97,13 +124,14 @@ def _axle_placement(model: pin.Model, axle: str | ArrayLike, where: str) -> pin.
     if isinstance(axle, str):
         return _level_frame(model, axle, f"{where}: axle")
     try:
-        point = array(axle, "axle")
+        numbers = array(axle, "axle")
     except InputError as error:
         raise error.at(where, RobotError) from None
-    if point.shape not in ((2,), (3,)):
-        expected = "a frame, x and y, or x, y and z (m)"
+    if numbers.shape not in ((2,), (3,), (4,)):
+        expected = "a frame, or x and y, z (m) and yaw (rad) behind them where they are not 0"
         raise RobotError(where=f"{where}: axle", expected=expected, got=axle)
-    return pin.SE3(np.eye(3), np.append(point, np.zeros(3 - len(point))))
+    x, y, z, yaw = np.append(numbers, np.zeros(4 - len(numbers)))
+    return pin.SE3(pin.utils.rotate("z", float(yaw)), np.array([x, y, z]))
 
 
 def _level_frame(model: pin.Model, name: str, where: str) -> pin.SE3:
@@ -125,39 +153,57 @@ def _yaw(placement: pin.SE3) -> float:
     return float(np.arctan2(placement.rotation[1, 0], placement.rotation[0, 0]))
 
 
-def _platform(
-    rebuilt: Rebuilt, source: Source, options: Options, base: VirtualBase | None
-) -> tuple[Platform, str, Layout | None, tuple[Finding, ...]]:
-    """The platform, who chose its kind, the file's wheels and joints, and where that differs."""
-    given = options.platform
-    name, origin = (source.platform, "file") if given is None else (given, "given")
-    if name is None and base is not None and base.kind is not None:
-        name, origin = base.kind, "base"
+@dataclass(frozen=True)
+class _Chosen:
+    """A platform, who chose its kind, the file's wheels and joints seen from its reference point, where that
+    is in the root link, what is to be told, and where the platform is not what the file's wheels are."""
+
+    platform: Platform
+    origin: str
+    layout: Layout | None = None
+    reference: Pose = AT_ROOT
+    told: tuple[Finding, ...] = ()
+    contradictions: tuple[Finding, ...] = ()
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        return (*self.told, *self.contradictions)
+
+
+def _platform(made: Locked, source: Source, options: Options, base: VirtualBase | None) -> _Chosen:
+    kind: Platform | str | None = source.platform if options.platform is None else options.platform
+    origin = "file" if options.platform is None else "given"
+    if kind is None and base is not None and base.kind is not None:
+        kind, origin = base.kind, "base"
     if _is_fixed(source, options):
-        return FixedBase(), origin, None, ()  # there is nothing to measure
-    visual, collision = rebuilt.geometries
+        return _Chosen(FixedBase(), origin)  # there is nothing to measure
+    measured = _measured(made, source)
+    layout = measure_layout(measured, options.wheels, options.steer)
+    told: tuple[Finding, ...] = ()
+    reference = AT_ROOT
     try:
-        layout = measure_layout(rebuilt.model, (collision, visual), options.wheels, source.where)
-    except RobotError:
-        if name is not None and not isinstance(name, Platform):
-            raise
-        layout = None  # its lengths are not needed
-    try:
-        if isinstance(name, Platform):
-            platform = name
-        elif name is None or layout is None:
-            platform, origin = usual_platform(layout)
+        if kind is None:
+            found = recognized(layout)
+            kind, told, origin = found.kind, found.notes, "wheels" if found.is_told else "default"
             if base is not None and origin == "default":
                 origin = "base"
+            if origin == "default":
+                names = measured.fixed_wheels
+                told = (Finding("wheels_fixed", {"names": names}) if names else Finding("no_wheels"),)
+        platform: Platform
+        if isinstance(kind, Platform):
+            platform = kind
         else:
-            platform = platform_by_name(name).fit(layout)
-        contradictions: tuple[Finding, ...] = ()
-        if layout is not None:
-            shapes = rebuilt.model, (collision, visual), options.wheels, source.where
-            contradictions = (*platform.compared(layout), *differing_radii(*shapes))
-        return platform, origin, layout, contradictions
+            if options.axle is None:
+                reference = reference_of(layout, kind)
+                layout = layout.moved(*reference) if reference != AT_ROOT else layout
+            platform = platform_by_name(kind).fit(layout)
+        contradictions = [*platform.compared(layout), *differing_radii(measured, options.wheels)]
     except InputError as error:
         raise error.at(source.where, RobotError) from None
+    if layout.wheels and platform.lengths:
+        told = (*told, *differing_tyres(measured, [wheel.joint for wheel in layout.wheels]))
+    return _Chosen(platform, origin, layout, reference, told, tuple(contradictions))
 
 
 def _is_fixed(source: Source, options: Options) -> bool:
@@ -233,7 +279,12 @@ def _without_wheels(
     wheels: tuple[Wheel, ...] = ()
     notes: list[Finding] = []
     if platform.coordinates:
-        wheels, notes = find_wheels(whole, (solid, shown), options.wheels, source.where, own, platform)
+        asked = options.wheels
+        if asked is not None:  # those that stand still are joints no more
+            left = {str(name) for name in whole.names}
+            kept = [name for name in asked if name in left]
+            asked = {name: asked[name] for name in kept} if isinstance(asked, Mapping) else kept
+        wheels, notes = find_wheels(_measured(made, source), asked, own, platform)
     names = list(dict.fromkeys(name for wheel in wheels for name in wheel.joints))
     model = whole
     if names:
@@ -268,24 +319,45 @@ def _without_wheels(
         mimic_joints=mimic_joints,
         parts=replace(parts, provenance=replace(parts.provenance, reduced=tuple(names))),
     )
-    casters = steered_casters(robot) if parts.provenance.platform == "default" else ()
-    remarks = (*limit_notes(robot), *slip_warnings(robot), *casters)
+    remarks = (*limit_notes(robot), *slip_warnings(robot))
     return replace(robot, **robot.shapes._asdict(), notes=(*robot.notes, *remarks))
 
 
-def _standing(made: Locked, names: Sequence[str], where: str) -> Locked:
-    """The model with more joints, and their mimic joints, fixed at zero; no note."""
-    others = [one for one in made.mimic_joints if one.joint not in names]
-    still = with_locked(made.rebuilt, {}, others, where, standing=dict.fromkeys(names, 0.0))
+def _standing(made: Locked, values: Mapping[str, float], where: str) -> Locked:
+    """The model with more joints, and their mimic joints, fixed at these values, rad or m; no note."""
+    others = [one for one in made.mimic_joints if one.joint not in values]
+    still = with_locked(made.rebuilt, {}, others, where, standing=dict(values))
     return replace(still, values=made.values, mimicked={**made.mimicked, **still.mimicked})
 
 
-def _with_held_wheels(made: Locked, asked: Asked, where: str) -> Locked:
+def _with_held_wheels(made: Locked, asked: Asked, source: Source) -> Locked:
     """The model of a base that does not move, with its wheels and their mimic joints fixed."""
     display = made.rebuilt
-    names, notes = held_joints(display.model, asked, where)
+    names, notes = held_joints(_measured(made, source), asked)
     if not names:
         return replace(made, rebuilt=replace(display, notes=(*display.notes, *notes)))
-    still = _standing(made, names, where)
+    still = _standing(made, dict.fromkeys(names, 0.0), source.where)
     notes += [Finding("wheels_held", {"names": [*names]}), *still.rebuilt.notes[len(display.notes) :]]
     return replace(still, rebuilt=replace(still.rebuilt, notes=(*display.notes, *notes)))
+
+
+def _with_idle_parts_held(
+    made: Locked, layout: Layout, own: Sequence[str], source: Source
+) -> tuple[Locked, list[Finding]]:
+    """The model in which what steers, without a wheel's joint and not as the platform's own, stands still
+    wheels whose size nothing tells."""
+    carrying = {wheel.carrier for wheel in layout.wheels}
+    follows = {one.joint for one in made.mimic_joints}
+    idle = [
+        pivot.joint
+        for pivot in layout.pivots
+        if pivot.steers and pivot.joint not in (*own, *carrying, *follows)
+    ]
+    unknown = without_radius(_measured(made, source), layout)
+    notes = [Finding("steering_held", {"names": idle})] if idle else []
+    notes += [Finding("radius_unknown", {"names": [*unknown]})] if unknown else []
+    if not idle and not unknown:
+        return made, []
+    before = made.rebuilt.notes
+    still = _standing(made, dict.fromkeys((*idle, *unknown), 0.0), source.where)
+    return replace(still, rebuilt=replace(still.rebuilt, notes=before)), notes

@@ -134,7 +134,7 @@ def _report(description: Description, given: Mapping[str, Any], found: Sequence[
         robot, problems = _loaded(description.path, given)
     if robot is not None:
         top, ground = _top(root), Ground.of(robot) if robot.platform.coordinates else None
-        warnings += [*wheel_advice(robot, top), *limit_notes(robot)]
+        warnings += [*wheel_advice(robot), *limit_notes(robot)]
         warnings += [*provenance_of(robot).contradictions, *robot.semantics.notes]
         warnings += [] if ground is None else ground.warnings(robot)
         facts |= _facts_of_robot(robot, None if ground is None else ground.fact(top))

@@ -22,6 +22,8 @@ from nmm.robots.loading.chain import mimic_joints_of
 from nmm.robots.loading.check import CheckedUrdf, inspect
 from nmm.robots.loading.check_parts import mesh_scale, shape_of
 from nmm.robots.loading.description import SUFFIXES, describe
+from nmm.robots.loading.drive_marks import DriveMarks, drive_marks
+from nmm.robots.loading.measured_joints import Undercarriage
 from nmm.robots.loading.packages import PACKAGE, package_file
 from nmm.robots.loading.provenance import Provenance
 from nmm.robots.loading.xml_tree import Element, child, children
@@ -44,7 +46,8 @@ class Source:
     where, label : its name in messages; its file, bundled name, or "pin.Model"
     all_pairs : whether we choose the collision pairs
     mimic_joints : each after its leader
-    platform : the kind that the file declares"""
+    platform : the kind that the file declares
+    marks : what the file's text says of its drive; undercarriage: what its wheels hang on, once found"""
 
     name: str
     where: str
@@ -58,6 +61,8 @@ class Source:
     platform: str | None = None
     notes: tuple[Finding, ...] = ()
     provenance: Provenance = field(default_factory=Provenance)
+    marks: DriveMarks = field(default_factory=DriveMarks)
+    undercarriage: Undercarriage = field(default_factory=Undercarriage)
 
 
 def read_file(
@@ -97,6 +102,7 @@ def read_file(
         platform=checked.platform,
         notes=(*description.notes, *left_out, *packages.notes, *_spared(checked.spared)),
         provenance=Provenance(dict(packages.found), packages.searched, meshes),
+        marks=drive_marks(checked.root),
     )
 
 
