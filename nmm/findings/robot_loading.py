@@ -86,7 +86,7 @@ _UNCLEAR = {
     "not_parallel": "wheels that neither steer nor swivel are not parallel: {names}",
     "several_axles": "wheels on several axles, neither in pairs nor steered: {names}",
     "steered_otherwise": "what steers fits no platform with these wheels: {names}",
-    "size_unknown": "platform skid_steer needs the wheels' radius, --wheels NAME=METRES,... for all of {names}",
+    "size_unknown": "platform skid_steer needs all radii, --wheels NAME=METRES,...: {names}",
     "rollers_in_line": "wheels with rollers that cannot move it every way: {names}",
 }
 

@@ -97,8 +97,8 @@ def _size(wheel: RollingJoint) -> float:
 @dataclass(frozen=True)
 class Axles:
     """Parallel wheels, seen along the direction in which they roll.
-    heading : that direction, from the root link's x axis, within (-45, 135] degrees; where it is nearer to the
-        y axis than to the x axis, the other way round if what is called left would be to the right
+    heading : that direction, from the root link's x axis, within (-45, 135] degrees; nearer to the y axis
+        than to the x axis the other way round if what is called left would be to the right
     places : (k, 2) the wheels' places ahead and to the left in axes turned by it, m"""
 
     heading: float
@@ -135,7 +135,7 @@ class Axles:
         ahead = ahead if abs(ahead) > _AHEAD else 0.0
         beside = beside if abs(beside) > _BESIDE else 0.0
         at = complex(ahead, beside) * cmath.rect(1.0, self.heading)
-        return at.real + 0.0, at.imag + 0.0, self.heading
+        return round(at.real, 12) + 0.0, round(at.imag, 12) + 0.0, self.heading
 
 
 def reference_of(layout: Layout, kind: str) -> Pose:

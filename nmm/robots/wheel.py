@@ -29,6 +29,8 @@ class Wheel:
     pivot : (3,) a point of the swivel's axis in the carrier's frame, m
     roller : angle γ of its rollers, rad (see `Platform.roller`)
     velocity : largest rate of its joint, rad/s; infinite without
+    slides : whether it may slide sideways: a caster without a swivel, one with rollers beside plain wheels,
+        one off the ground
 
     Examples
     --------
@@ -47,6 +49,7 @@ class Wheel:
     pivot: Array = field(default_factory=lambda: np.zeros(3))
     roller: float = 0.0
     velocity: float = math.inf
+    slides: bool = False
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -56,4 +59,4 @@ class Wheel:
     @property
     def is_fixed(self) -> bool:
         """Whether it hangs on the root link's body, without swivel and rollers: it rolls one way only."""
-        return self.carrier == "theta" and not self.swivel and self.roller == 0.0
+        return self.carrier == "theta" and not self.swivel and self.roller == 0.0 and not self.slides

@@ -22,7 +22,7 @@ def plain_wheels(robot: Robot) -> list[Wheel]:
     platform = robot.platform
     if platform.n_p < 3 or np.any(platform.sliding(np.eye(platform.p))):
         return []
-    plain = [wheel for wheel in robot.wheels if wheel.roller == 0.0]
+    plain = [wheel for wheel in robot.wheels if wheel.roller == 0.0 and not wheel.slides]
     return [] if platform.p > 2 and platform.n_p == 3 and len(plain) > 2 else plain
 
 

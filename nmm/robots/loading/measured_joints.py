@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -365,16 +365,18 @@ def speed_limit(model: pin.Model, joint: int) -> float:
 
 
 def find_wheels(
-    measured: Measured, asked: Asked, own: Sequence[str], platform: Platform
+    measured: Measured, asked: Asked, own: Sequence[str], platform: Platform, sliding: Collection[str] = ()
 ) -> tuple[tuple[Wheel, ...], list[Finding]]:
-    """The robot's passive wheels, and notes on joints that are only named wheels.
+    """The robot's passive wheels, those in `sliding` as such, and notes on joints that are only named wheels.
 
     A wheel is a revolute joint with a level axis and no joint below it, on the root link's body, one of the
     platform's own joints or a swivel: an upright joint, not the platform's own, that hangs on one of these
     and carries only wheels. Without `asked`, the joint's or child link's name must hold "wheel" (or "tire",
     "caster", lw, rw), or its shape be one. `RobotError` for no joint, or no wheel."""
     radii, notes = measured.wheels(asked, own)
-    wheels = tuple(_wheel(measured, name, radii[name], own, platform) for name in radii)
+    wheels = tuple(
+        replace(_wheel(measured, name, radii[name], own, platform), slides=name in sliding) for name in radii
+    )
     swivels = {wheel.swivel for wheel in wheels}  # named as wheels, and left out of q as these are
     return wheels, [note for note in notes if note.values.get("name") not in swivels]
 

@@ -1,6 +1,6 @@
 """From what was read to a `Robot`: joints locked, reference point, platform, wheels, in this order."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from nmm.errors import InputError, RobotError, expect_known
 from nmm.findings import Finding
 from nmm.platforms import AddedJoint, FixedBase, Layout, Platform, platform_by_name
 from nmm.platforms.recognition import AT_ROOT, Pose, recognized, reference_of
+from nmm.platforms.wheel_layout import MAIN_BODY, standing_wheels, wheels_on
 from nmm.robots.loading.chain import CHAIN, Rebuilt, rebuild
 from nmm.robots.loading.ground import slip_warnings
 from nmm.robots.loading.locking import Locked, add_pairs, among_coordinates, at_zero, limit_notes, with_locked
@@ -102,7 +103,14 @@ def robot_from(source: Source, options: Options) -> Robot:
         contradictions=chosen.contradictions,
     )
     parts = Parts(made.rebuilt.geometries[1], (*source.notes, *made.rebuilt.notes, *remarks), provenance)
-    return _without_wheels(made, platform, own, source, options, parts)
+    sliding = () if layout is None else _sliding(layout)
+    return _without_wheels(made, platform, own, source, options, parts, sliding)
+
+
+def _sliding(layout: Layout) -> frozenset[str]:
+    """The main body's wheels that constrain nothing."""
+    standing = {wheel.joint for wheel in standing_wheels(layout)}
+    return frozenset({wheel.joint for wheel in wheels_on(layout, MAIN_BODY)} - standing)
 
 
 def _measured(made: Locked, source: Source) -> Measured:
@@ -272,7 +280,13 @@ def _on_platform(rebuilt: Rebuilt, platform: Platform, own: Sequence[str], where
 
 
 def _without_wheels(
-    made: Locked, platform: Platform, own: Sequence[str], source: Source, options: Options, parts: Parts
+    made: Locked,
+    platform: Platform,
+    own: Sequence[str],
+    source: Source,
+    options: Options,
+    parts: Parts,
+    sliding: Collection[str],
 ) -> Robot:
     """The robot, with its wheels on the display model only."""
     whole, (shown, solid) = made.rebuilt.model, made.rebuilt.geometries
@@ -284,7 +298,7 @@ def _without_wheels(
             left = {str(name) for name in whole.names}
             kept = [name for name in asked if name in left]
             asked = {name: asked[name] for name in kept} if isinstance(asked, Mapping) else kept
-        wheels, notes = find_wheels(_measured(made, source), asked, own, platform)
+        wheels, notes = find_wheels(_measured(made, source), asked, own, platform, sliding)
     names = list(dict.fromkeys(name for wheel in wheels for name in wheel.joints))
     model = whole
     if names:
