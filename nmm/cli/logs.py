@@ -27,7 +27,7 @@ def export(
 ) -> int:
     """Write a run as a log that Foxglove, Rerun and ROS 2's tools open.
 
-    Joint states, TF, odometry, twist, inputs, task error, paths, events, the robot's description
+    Joint states, TF, odometry, poses, twist, inputs, task error, paths, events, the robot's description
     (docs/ros.md). Needs pip install rosbags.
 
     \b

@@ -75,8 +75,8 @@ def _write_joint(root: Element, robot: Robot, link: Link, place: Array) -> None:
     unlimited = turns and np.isinf(ends).all()
     joint.set("type", "continuous" if unlimited else "revolute" if turns else "prismatic")
     SubElement(joint, "axis", xyz=_text(sign * (angular if turns else linear)))
-    most = model.upperEffortLimit[v], model.velocityLimit[v]
-    limit = SubElement(joint, "limit", {name: _number(x) for name, x in zip(("effort", "velocity"), most)})
+    most = {"effort": _number(model.upperEffortLimit[v]), "velocity": _number(model.velocityLimit[v])}
+    limit = SubElement(joint, "limit", most)
     if not unlimited:
         limit.attrib |= {"lower": _number(ends[0]), "upper": _number(ends[1])}
     for one in robot.mimic_joints:
@@ -86,7 +86,9 @@ def _write_joint(root: Element, robot: Robot, link: Link, place: Array) -> None:
             SubElement(joint, "mimic", {"joint": one.leader, **numbers})
 
 
-def _parts(shape: pin.GeometryObject, files: Mapping[str, tuple[str, str]]) -> Iterator[tuple[Element, Array]]:
+def _parts(
+    shape: pin.GeometryObject, files: Mapping[str, tuple[str, str]]
+) -> Iterator[tuple[Element, Array]]:
     """A shape in URDF's words, each with its place (4, 4) in it; nothing where there are none."""
     form, middle = shape.geometry, np.eye(4)
     if isinstance(form, fcl.Box):
@@ -98,7 +100,8 @@ def _parts(shape: pin.GeometryObject, files: Mapping[str, tuple[str, str]]) -> I
         yield Element("cylinder", radius=radius, length=_number(2.0 * half)), middle
         if isinstance(form, fcl.Capsule):  # URDF 1.0 has none
             for end in (half, -half):
-                yield Element("sphere", radius=radius), pin.SE3(np.eye(3), np.array([0.0, 0.0, end])).homogeneous
+                at = pin.SE3(np.eye(3), np.array([0.0, 0.0, end]))
+                yield Element("sphere", radius=radius), at.homogeneous
     elif shape.meshPath and Path(shape.meshPath).is_absolute():
         _, inside = files.get(shape.meshPath, ("", ""))
         name = f"{PACKAGE}{inside}" if inside else Path(shape.meshPath).as_uri()

@@ -12,8 +12,10 @@ from nmm.playback.placements import Placements, position_and_quaternion
 from nmm.robots.robot import Robot
 from nmm.ros.making import base_joint
 
-#: Pinocchio's kinds of frames that are links: those of a file's, and those that a model made by hand calls so.
+#: Pinocchio's kinds of frames that are links: a file's, and those of a model made by hand.
 _LINKS = ("BODY", "OP_FRAME")
+#: Parent, child, position (3,) and quaternion (4,) x y z w.
+Transform = tuple[str, str, Array, Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +47,8 @@ class Links:
         frames, first = list(self._model.frames), {self.root: base}
         names: dict[int, str] = {}
         for index, frame in enumerate(frames):
-            is_link = frame.type.name in _LINKS and frame.name != "universe" and frame.parentJoint >= self.root
-            if is_link and frame.name not in names.values():
+            is_link = frame.type.name in _LINKS and frame.name != "universe"
+            if is_link and frame.parentJoint >= self.root and frame.name not in names.values():
                 names[index] = frame.name
                 if frame.placement.isIdentity(1e-9):
                     first.setdefault(frame.parentJoint, frame.name)
@@ -64,11 +66,11 @@ class Links:
         for index, name in names.items():
             if name not in self.links:
                 frame, above = frames[index], frames[frames[index].parentFrame]
-                joint = above.name if above.type.name == "FIXED_JOINT" else f"{name}_fixed"
-                joint = _free(joint, joints)
-                joints.add(joint)
+                wanted = above.name if above.type.name == "FIXED_JOINT" else f"{name}_fixed"
+                by = _free(wanted, joints)
+                joints.add(by)
                 parent, at = self.holder(frame.parentFrame, frame.parentJoint), frame.placement.homogeneous
-                self.links[name] = Link(name, frame.parentJoint, at, parent, joint)
+                self.links[name] = Link(name, frame.parentJoint, at, parent, by)
 
     def holder(self, index: int, joint: int) -> str:
         """The nearest link on a joint from a frame upwards; the first where none is, as of a shape that names
@@ -80,32 +82,28 @@ class Links:
             index = frames[index].parentFrame
         return self._first[joint]
 
-    def placement(self, link: Link) -> Array:
-        """(4, 4) where a link is in its parent with its joint at zero."""
-        at = self._model.jointPlacements[link.on].homogeneous if link.moves else link.place
+    def placement(self, link: Link, at: Array | None = None) -> Array:
+        """(4, 4) where a link is in its parent, with its joint `at` (4, 4) in its parent joint, by default at
+        zero."""
+        if not link.moves:
+            at = link.place
+        elif at is None:
+            at = self._model.jointPlacements[link.on].homogeneous
         return np.asarray(np.linalg.inv(self.links[link.parent].place) @ at)
 
     @property
-    def fixed(self) -> list[tuple[str, str, Array, Array]]:
-        """Transforms (parent, child, position, quaternion) of links that do not move in their parents."""
-        return [
-            (link.parent, link.name, *position_and_quaternion(self.placement(link)))
-            for link in self.links.values()
-            if link.parent and not link.moves
-        ]
+    def fixed(self) -> list[Transform]:
+        """Transforms of links that do not move in their parents."""
+        still = (link for link in self.links.values() if link.parent and not link.moves)
+        return [(link.parent, link.name, *position_and_quaternion(self.placement(link))) for link in still]
 
-    def moving(self, q: Array, wheels: Array) -> list[tuple[str, str, Array, Array]]:
+    def moving(self, q: Array, wheels: Array) -> list[Transform]:
         """Those of links on joints, at q (n,) and the wheels' angles (D,)."""
         relative = self._placements.relative(q, wheels)
-        return [
-            (
-                link.parent,
-                link.name,
-                *position_and_quaternion(np.linalg.inv(self.links[link.parent].place) @ relative[link.on - 1]),
-            )
-            for link in self.links.values()
-            if link.moves
-        ]
+        found = (
+            (link, self.placement(link, relative[link.on - 1])) for link in self.links.values() if link.moves
+        )
+        return [(link.parent, link.name, *position_and_quaternion(at)) for link, at in found]
 
 
 def _free(name: str, taken: set[str]) -> str:

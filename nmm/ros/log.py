@@ -21,7 +21,6 @@ from nmm.ros.links import Links
 from nmm.ros.making import Messages
 
 if TYPE_CHECKING:
-    from nmm.robots.robot import Robot
     from nmm.runs.trajectory import Trajectory
 
 JOINTS, INPUTS, ODOMETRY, TWIST, ERROR = "/joint_states", "/inputs", "/odom", "/cmd_vel", "/error"
@@ -91,9 +90,12 @@ def messages_of(trajectory: Trajectory, made: Messages) -> Iterator[Timed]:
         yield first, EVENTS, made.log(begin, DESCRIPTION, words)
     if links.fixed:
         yield first, TF_STATIC, made.tf([(begin, *one) for one in links.fixed])
+    # x and y count from the ground's frame, which the log calls odom, or map: a root may stand elsewhere.
+    ground = robot.model.jointPlacements[1].inverse() if robot.platform.n_p else pin.SE3.Identity()
     for topic, points in ((PATH, run.path), (DESIRED, run.moving)):
         if points is not None and len(points):
-            yield first, topic, made.path(begin, points, world)
+            yield first, topic, made.path(begin, [ground.act(point) for point in points], world)
+    posed = run.frame is not None and run.frame in robot.frames
     events = sorted(run.events, key=lambda event: event.t)
     for k, t in enumerate(run.t.tolist()):
         while events and (events[0].t <= t or k == len(run) - 1):
@@ -108,10 +110,12 @@ def messages_of(trajectory: Trajectory, made: Messages) -> Iterator[Timed]:
         yield now, ODOMETRY, made.odometry(t, seen, q_dot)
         stand = planar_matrix(seen if robot.platform.n_p else np.zeros(3))
         yield now, BASE_POSE, made.pose(t, stand)
-        if run.frame in robot.frames:
-            yield now, FRAME_POSE, made.pose(t, Configuration(robot, q).placement(run.frame).homogeneous, world)
+        if posed:
+            reached = ground * Configuration(robot, q).placement(str(run.frame))
+            yield now, FRAME_POSE, made.pose(t, reached.homogeneous, world)
         if run.desired is not None and np.isfinite(run.desired[k]).all():
-            yield now, DESIRED_POSE, made.pose(t, pin.SE3(np.eye(3), run.desired[k]).homogeneous, world)
+            wanted = pin.SE3(np.eye(3), ground.act(run.desired[k]))
+            yield now, DESIRED_POSE, made.pose(t, wanted.homogeneous, world)
         moved = [(t, *one) for one in links.moving(q, angles[k])]
         frames = [(t, made.odom, made.base, *position_and_quaternion(stand))]
         if run.believed is not None:
