@@ -14,6 +14,8 @@ import pinocchio as pin
 import pytest
 from gripping_cart import cart
 from test_mounting import PANDA, UR5
+from test_robot_description import mesh_beside
+from urdf_parts import joint, link, robot, shape, write
 
 import nmm
 from nmm.ros.description import packaged
@@ -106,7 +108,9 @@ def test_rerun_makes_of_each_topic_what_the_page_says(logged: tuple[nmm.Trajecto
 
 
 def test_rerun_needs_the_packages_of_meshes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made = nmm.load(UR5, platform="fixed")
+    """It reads one that lies beside the robot's file as it is, blanks and letters included."""
+    plate = robot(link("a", shape(mesh_beside(tmp_path))), link("b"), joint())
+    made = nmm.mount(nmm.load(UR5, platform="fixed"), write(tmp_path / "plate.urdf", plate), at="ee_link")
     aim = nmm.Task(nmm.Posture("elbow_joint"), [0.1])
     run = nmm.simulate(nmm.Controller(made, aim, nmm.ProjectedGradient()), made.rest, 0.1, 0.05)
     path = run.save_mcap(tmp_path / "run.mcap")
@@ -115,7 +119,8 @@ def test_rerun_needs_the_packages_of_meshes(tmp_path: Path, monkeypatch: pytest.
         monkeypatch.setenv("ROS_PACKAGE_PATH", text)
         found = by_rerun(path)
         counts.append(sum(bool(column(tables, "Asset3D:blob")) for tables in found.values()))
-    assert counts == [0, len(made.visual_model.geometryObjects)]
+    assert counts == [1, len(made.visual_model.geometryObjects)]
+    assert counts[1] > 7
 
 
 class Local:

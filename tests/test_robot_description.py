@@ -49,6 +49,17 @@ MJCF = """<mujoco model="arm"><compiler angle="radian"/><worldbody><body name="f
       <geom type="cylinder" size="0.02 0.1"/></body></body></body></worldbody></mujoco>"""
 
 
+def base_of_joints() -> str:
+    """A base that two slides and a turn move over the ground, and an arm on it."""
+    slide = '<limit lower="-9" upper="9" effort="1" velocity="1"/>'
+    ways = {"along": '<axis xyz="1 0 0"/>' + slide, "across": '<axis xyz="0 1 0"/>' + slide}
+    parts = [link("ground"), link("a"), link("b"), link("base_link"), link("arm")]
+    for (name, body), parent, child in zip(ways.items(), ("ground", "a"), ("a", "b"), strict=True):
+        parts.append(joint(name, parent, child, "prismatic", body, ""))
+    parts.append(joint("about", "b", "base_link", "continuous", '<axis xyz="0 0 1"/>', ""))
+    return robot(*parts, joint("q1", "base_link", "arm"))
+
+
 def turned(folder: Path) -> Robot:
     return nmm.load(write(folder / "down.urdf", vehicle("steering", 0.7, False)))
 
@@ -68,6 +79,7 @@ ROBOTS: dict[str, Callable[[Path], Robot]] = {
     "all joints": lambda folder: nmm.load(
         write(folder / "tree.urdf", random_tree(np.random.default_rng(3), 9)), platform="omnidirectional"
     ),
+    "base of joints": lambda folder: nmm.load(write(folder / "base.urdf", base_of_joints())),
     "by hand": lambda _: nmm.load(by_hand()),
 }
 
@@ -149,7 +161,9 @@ def run_of(made: Robot) -> nmm.Trajectory:
     return nmm.simulate(nmm.Controller(made, aim, nmm.ProjectedGradient()), made.rest, 0.1, 0.05)
 
 
-@pytest.mark.parametrize("name", ["mounted", "trailers", "mimic", "axle", "by hand", "fixed"])
+@pytest.mark.parametrize(
+    "name", ["mounted", "trailers", "mimic", "axle", "by hand", "fixed", "base of joints"]
+)
 def test_tf_is_the_tree_of_the_description(name: str, tmp_path: Path) -> None:
     """The same edges: a frame that has two parents is none in Rerun."""
     made = ROBOTS[name](tmp_path)
@@ -163,6 +177,8 @@ def test_tf_is_the_tree_of_the_description(name: str, tmp_path: Path) -> None:
         for part in told.get("/tf_static", [])
         for one in part.transforms
     ]
+    if name == "base of joints":
+        assert ("odom", "base_link") in moving
     children = [child for _, child in moving + still]
     assert len(children) == len({*children})
     edges = {(one.parent, one.child) for one in described.robot.joints}
@@ -210,12 +226,17 @@ def test_limits_and_mimics_are_the_files(tmp_path: Path) -> None:
     assert (other.joint, other.multiplier, other.offset) == (one.joint, one.multiplier, one.offset)
 
 
+def mesh_beside(folder: Path) -> str:
+    """A mesh in a folder beside a robot's file, and in no package."""
+    (folder / "our looks").mkdir()
+    write(folder / "our looks" / "plate ü.stl", STL)
+    return '<mesh filename="our looks/plate ü.stl" scale="1 2 3"/>'
+
+
 def test_meshes_are_found_by_package_or_by_file(tmp_path: Path, capsys: Any, monkeypatch: Any) -> None:
     """From `nmm run` of a scenario with an arm mounted, to its log."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "looks").mkdir()
-    write(tmp_path / "looks" / "plate.stl", STL)
-    plate = shape('<mesh filename="looks/plate.stl" scale="1 2 3"/>')
+    plate = shape(mesh_beside(tmp_path))
     write(tmp_path / "stand.urdf", robot(link("a", plate), link("b"), joint(), attributes='name="stand"'))
     made = nmm.mount(nmm.mount("unicycle_2r", UR5, at="arm_base"), "stand.urdf", at="base_link")
     described = yourdfpy.URDF.load(
@@ -228,7 +249,7 @@ def test_meshes_are_found_by_package_or_by_file(tmp_path: Path, capsys: Any, mon
         if one.geometry.mesh is not None
     }
     by_file = {name for name in names if name.startswith("file://")}
-    assert by_file == {(tmp_path / "looks" / "plate.stl").as_uri()}
+    assert by_file == {f"file://{tmp_path}/our looks/plate ü.stl"}  # Rerun takes no %20
     (folder,) = {folder for folder, _ in packaged(made).values()}
     assert len(names - by_file) > 4
     for name in names - by_file:
@@ -285,6 +306,25 @@ def test_what_urdf_has_no_words_for_is_told(tmp_path: Path) -> None:
     assert [one.geometry.cylinder.length for one in drawn if one.geometry.cylinder] == [0.4]
     ends = [one.origin[2, 3] for one in drawn if one.geometry.sphere]
     assert sorted(ends) == [-0.2, 0.2]
+
+
+def test_the_ground_of_a_file_is_still(tmp_path: Path) -> None:
+    """The link below a free joint is where the world is, which the robot's base leaves."""
+    text = """<mujoco><worldbody><body name="box" pos="0 0 0.1"><freejoint/><geom type="box" size="1 1 0.1"/>
+    <body name="arm"><joint name="q1" axis="0 0 1"/><geom size="0.1"/></body></body></worldbody></mujoco>"""
+    made = nmm.load(write(tmp_path / "box.xml", text), platform="omnidirectional")
+    told = messages(run_of(made).save_mcap(tmp_path / "run.mcap"))
+    ground = [frame.name for frame in made.model.frames if frame.type == pin.BODY and frame.parentJoint == 0]
+    assert ground == ["world"]
+    still = [one for part in told["/tf_static"] for one in part.transforms]
+    assert [one.header.frame_id for one in still if one.child_frame_id == "world"] == ["odom"]
+    frames = nmm.ros.Transforms()
+    for part in (*told["/tf_static"], told["/tf"][-1]):
+        frames.add(part)
+    here = nmm.Configuration(made, run_of(made).q[-1])
+    found = np.linalg.inv(frames.placement("odom", "world")) @ frames.placement("odom", "arm")
+    wanted = here.placement("world").inverse() * here.placement("arm")
+    np.testing.assert_allclose(found, wanted.homogeneous, atol=1e-12)
 
 
 def test_a_root_away_from_the_origin_stands_on_its_ground(tmp_path: Path) -> None:

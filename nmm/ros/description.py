@@ -104,7 +104,7 @@ def _parts(
                 yield Element("sphere", radius=radius), at.homogeneous
     elif shape.meshPath and Path(shape.meshPath).is_absolute():
         _, inside = files.get(shape.meshPath, ("", ""))
-        name = f"{PACKAGE}{inside}" if inside else Path(shape.meshPath).as_uri()
+        name = f"{PACKAGE}{inside}" if inside else f"file://{shape.meshPath}"
         yield Element("mesh", filename=name, scale=_text(shape.meshScale)), middle
 
 

@@ -39,19 +39,24 @@ class Link:
 
 
 class Links:
-    """Every link of a robot, by name, from the root `base` on, the platform's reference point."""
+    """Every link of a robot, by name, from the root `base` on, the platform's reference point; and those that
+    the platform drives on, where they are in the world (`ground`)."""
 
     def __init__(self, robot: Robot, base: str) -> None:
         self._placements, self._model = Placements(robot), robot.display_model
         self.root = base_joint(robot)
         frames, first = list(self._model.frames), {self.root: base}
         names: dict[int, str] = {}
+        self.ground: list[tuple[str, pin.SE3]] = []
         for index, frame in enumerate(frames):
-            is_link = frame.type.name in _LINKS and frame.name != "universe"
-            if is_link and frame.parentJoint >= self.root and frame.name not in names.values():
+            if frame.type.name not in _LINKS or frame.name in ("universe", *names.values()):
+                continue
+            if frame.parentJoint >= self.root:
                 names[index] = frame.name
                 if frame.placement.isIdentity(1e-9):
                     first.setdefault(frame.parentJoint, frame.name)
+            elif frame.parentJoint == 0:
+                self.ground.append((frame.name, frame.placement))
         for joint in range(self.root, self._model.njoints):
             if joint not in first:
                 first[joint] = _free(str(self._model.names[joint]), {*names.values(), *first.values()})

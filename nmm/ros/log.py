@@ -88,10 +88,13 @@ def messages_of(trajectory: Trajectory, made: Messages) -> Iterator[Timed]:
     if left_out:
         words = f"shapes that a URDF has no words for are not drawn: {few(left_out)}"
         yield first, EVENTS, made.log(begin, DESCRIPTION, words)
-    if links.fixed:
-        yield first, TF_STATIC, made.tf([(begin, *one) for one in links.fixed])
     # x and y count from the ground's frame, which the log calls odom, or map: a root may stand elsewhere.
     ground = robot.model.jointPlacements[1].inverse() if robot.platform.n_p else pin.SE3.Identity()
+    still = [
+        (world, name, *position_and_quaternion((ground * place).homogeneous)) for name, place in links.ground
+    ]
+    if still := [*links.fixed, *still]:
+        yield first, TF_STATIC, made.tf([(begin, *one) for one in still])
     for topic, points in ((PATH, run.path), (DESIRED, run.moving)):
         if points is not None and len(points):
             yield first, topic, made.path(begin, [ground.act(point) for point in points], world)

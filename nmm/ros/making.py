@@ -276,11 +276,13 @@ def in_nanoseconds(t: float) -> int:
 
 def root_link(robot: Robot) -> str:
     """The link at the platform's reference point, or "reference_point" where no link is; of a fixed base the
-    link at its root."""
-    base = base_joint(robot)
-    links = (frame for frame in robot.model.frames if frame.parentJoint == base and frame.type.name == "BODY")
-    at_rest = (link.name for link in links if link.placement.isIdentity(1e-9) and link.name != "universe")
-    return next(at_rest, "reference_point")
+    link at its root, of a base of joints the one that they move."""
+    base, frames = base_joint(robot), robot.model.frames
+    links = (frame for frame in frames if frame.parentJoint == base and frame.type.name == "BODY")
+    at_rest = [link for link in links if link.placement.isIdentity(1e-9) and link.name != "universe"]
+    moved = [note.values["names"][-1] for note in robot.notes if note.code == "base_of_joints"]
+    carried = (link.name for link in at_rest if frames[link.parentFrame].name in moved)
+    return next(carried, at_rest[0].name if at_rest else "reference_point")
 
 
 def base_joint(robot: Robot) -> int:
