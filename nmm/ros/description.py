@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, tostring
@@ -12,13 +13,12 @@ import pinocchio as pin
 from nmm.arrays import Array
 from nmm.playback.placements import joint_screw
 from nmm.playback.sticks import appearance
-from nmm.robots.loading.mending import NO_LIMIT
-from nmm.robots.loading.packages import PACKAGE
 from nmm.robots.loading.provenance import provenance_of
 from nmm.robots.robot import Robot
 from nmm.ros.links import Link, Links
 
 fcl = pin.hppfcl
+PACKAGE = "package://"
 
 
 def description(robot: Robot, links: Links) -> tuple[str, list[str]]:
@@ -118,8 +118,6 @@ def _text(values: Array) -> str:
 
 
 def _number(value: float) -> str:
-    """All digits; infinity and what has lost digits as readers of URDF take them."""
-    value = float(value)
-    if not np.isfinite(value):
-        return NO_LIMIT if value > 0.0 else f"-{NO_LIMIT}"
-    return repr(value if abs(value) > 1e-300 else 0.0)
+    """All digits; what is infinite, or has lost digits, as the nearest number that readers of URDF take."""
+    most = sys.float_info.max
+    return repr(float(np.clip(value, -most, most)) if abs(value) > 1e-300 else 0.0)
