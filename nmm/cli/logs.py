@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -26,13 +27,14 @@ def export(
 ) -> int:
     """Write a run as a log that Foxglove, Rerun and ROS 2's tools open.
 
-    Joint states, TF, odometry, twist, inputs, task error, paths, events, the robot's description
+    Joint states, TF, odometry, poses, twist, inputs, task error, paths, events, the robot's description
     (docs/ros.md). Needs pip install rosbags.
 
     \b
     nmm export runs/unicycle_2r_position-rg --mcap
     nmm export runs/unicycle_2r_position-rg --mcap here.mcap --start 1700000000
     """
+    from nmm.ros.description import packaged
     from nmm.runs.trajectory import Trajectory
 
     if not mcap:
@@ -42,6 +44,8 @@ def export(
     with shielded():
         run.save_mcap(path, start)
     show_text(f"written: {path}")
+    if folders := dict.fromkeys(folder for folder, _ in packaged(run.robot).values()):
+        show_text(f"its meshes are found with ROS_PACKAGE_PATH={os.pathsep.join(folders)}")
     return OK
 
 
