@@ -86,7 +86,7 @@ class Transforms:
 
     def _chain(self, frame: str) -> dict[str, Array]:
         """The frames above a frame, and its pose in each."""
-        frame = prefixed(frame, self.prefix, {*self.frames})
+        frame = prefixed(frame, self.prefix, {*self.frames}, ("map",))
         above = {frame: np.eye(4)}
         while frame in self.newest:
             parent, pose = self.newest[frame]
@@ -96,7 +96,7 @@ class Transforms:
         return above
 
 
-def prefixed(frame: str, prefix: str, frames: Collection[str], shared: Collection[str] = ("map",)) -> str:
+def prefixed(frame: str, prefix: str, frames: Collection[str], shared: Collection[str] = ()) -> str:
     """The name of a frame among those that there are: with the prefix; without it those that robots share, or
     where no frame has it."""
     frame, prefix = plain(frame), plain(prefix)

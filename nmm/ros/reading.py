@@ -56,7 +56,9 @@ def joints(message: Any) -> dict[str, float]:
     >>> nmm.ros.joints(Message(name=["q2", "q1"], position=[0.5, 0.1], velocity=[]))
     {'q2': 0.5, 'q1': 0.1}
     """
-    return _byname_of(message, "position")
+    _field(message, "name")
+    speeds_alone = len(message.position) == 0 < len(getattr(message, "velocity", ()))
+    return {} if speeds_alone else _by_name(message, "position")
 
 
 def rates(message: Any) -> dict[str, float]:
@@ -68,7 +70,7 @@ def rates(message: Any) -> dict[str, float]:
     >>> nmm.ros.rates(Message(name=["q1"], position=[0.1], velocity=[]))
     {}
     """
-    return _byname_of(message, "velocity") if len(_field(message, "velocity")) else {}
+    return _by_name(message, "velocity") if len(_field(message, "velocity")) else {}
 
 
 def placement(message: Any) -> Array:
@@ -240,7 +242,7 @@ def joint_trajectory(message: Any) -> tuple[Array, dict[str, Array]]:
     return times, dict(zip(names, np.array(rows).T, strict=True))
 
 
-def _byname_of(message: Any, part: str) -> dict[str, float]:
+def _by_name(message: Any, part: str) -> dict[str, float]:
     where, names = name_of(message), [*_field(message, "name")]
     values = _field(message, part)
     expect(len({*names}) == len(names), f"{where}: name", "each joint once", names)

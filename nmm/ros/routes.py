@@ -98,7 +98,7 @@ def routes(recorded: Recorded) -> tuple[Route, Route | None]:
     where odometry has it, if it does; `InputError` where there is none."""
     names, tree, edge = recorded.names, recorded.tree, recorded.odometry
     frames = tree.frames
-    world, odom = (prefixed(name, recorded.prefix, frames) for name in (names.map, names.odom))
+    world, odom = (prefixed(one, recorded.prefix, frames, (names.map,)) for one in (names.map, names.odom))
     mapped = counted = None
     if edge is not None:
         tail = _tail_of(recorded, edge.child)

@@ -139,11 +139,8 @@ class _Streamed:
                         if encoding in self._decoders:
                             yield topic, kind, (encoding, record)
             except Exception as error:  # of bytes that are cut or are others
-                self.reason = _READ.get(type(error).__name__, str(error) or type(error).__name__)
-
-
-#: What mcap's errors mean, by their types.
-_READ = {"EndOfFile": "it lacks its end", "CRCValidationError": "bytes of it are others than written"}
+                cut = type(error).__name__ in ("EndOfFile", "error")  # mcap's, and that of struct
+                self.reason = "it lacks its end" if cut else "bytes of it are others than written"
 
 
 class _Refusing:

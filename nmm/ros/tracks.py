@@ -16,8 +16,8 @@ STANDS = 500_000_000
 #: Stamps farther from the time of recording, ns, are another clock's.
 ANOTHER = 1_000_000_000
 #: A step of what moves is a jump where its neighbours do not foretell it within m (rad), and m/s² (rad/s²)
-#: times the interval squared; no wheels do that.
-MOVES = np.array([[0.05, 3.0], [0.1, 20.0]])
+#: times the interval squared; tyres hold no more than 1 g.
+MOVES = np.array([[0.05, 10.0], [0.1, 40.0]])
 #: Of a frame that corrects another one: m (rad), and per second.
 CORRECTS = np.array([[0.05, 0.1], [0.05, 0.1]])
 #: Rates are compared with what moved in so long, s, if it is more than so much, rad or m.
@@ -150,10 +150,10 @@ def jumps_of(times: Integers, poses: Array, corrects: bool) -> Flags:
 def foretold(times: Integers, poses: Array, twists: Array) -> Flags:
     """Which steps (M - 1,) between poses (M, 4, 4) the twists (M, 3) there are large enough for."""
     lasts, steps = steps_of(times, poses)
-    mean = 0.5 * (twists[1:] + twists[:-1]) * lasts[:, np.newaxis]
-    far, turned = np.hypot(steps[:, 0], steps[:, 1]), np.abs(steps[:, 2])
-    within = (np.hypot(mean[:, 0], mean[:, 1]) >= 0.5 * far) | (far <= MOVES[0, 0])
-    return np.asarray(within & ((np.abs(mean[:, 2]) >= 0.5 * turned) | (turned <= MOVES[1, 0])))
+    far = np.column_stack([np.hypot(steps[:, 0], steps[:, 1]), np.abs(steps[:, 2])])
+    speeds = np.column_stack([np.hypot(twists[:, 0], twists[:, 1]), np.abs(twists[:, 2])])
+    within = np.maximum(speeds[1:], speeds[:-1]) * lasts[:, np.newaxis]
+    return np.asarray(((2.0 * within >= far) | (far <= MOVES[:, 0])).all(axis=1))
 
 
 def contradict(times: Integers, values: Array, rates: Array) -> bool:
