@@ -15,6 +15,7 @@ from robot_logs import FIRST, STORE, Sent, bag, bag_of_ros1, joints, odom, tf, t
 import nmm
 from nmm.cli.exit_status import status_of
 from nmm.errors import InputError
+from nmm.findings import bag as bag_words
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*:RuntimeWarning")
 NAN = math.nan
@@ -342,7 +343,7 @@ def test_compare_takes_topics_and_frames(tmp_path: Path, monkeypatch: Any, capsy
     assert status_of(["compare", "run", "log", *asked, "--out", "both"]) == 0
     heard = capsys.readouterr()
     assert heard.err.splitlines() == [
-        "warning: log: q1 and q2 are all 0 while it moves: differences of q are taken"
+        "warning: log: q1 and q2 are all 0 while q moves: differences of q are taken"
     ]
     found = nmm.Trajectory.load("both/log")
     np.testing.assert_allclose(found.q, run.q, atol=1e-9)
@@ -351,3 +352,76 @@ def test_compare_takes_topics_and_frames(tmp_path: Path, monkeypatch: Any, capsy
     assert "/r1/arm/joints" in capsys.readouterr().err
     assert status_of(["compare", "unicycle_2r_position", "--namespace", "r1"]) == 2
     assert "--namespace" in capsys.readouterr().err
+
+
+WORDS = [
+    (
+        "bag_cut",
+        {"file": "a.mcap", "reason": "it lacks its end", "mend": "mcap recover a.mcap"},
+        {},
+        "a.mcap is read as far as it goes (it lacks its end); to mend it: mcap recover a.mcap",
+    ),
+    (
+        "stamps_of_recording",
+        {"topic": "/odom", "why": "zero"},
+        {},
+        "/odom has stamps of 0: it goes by the times of recording",
+    ),
+    ("stamps_missing", {"topic": "/odom", "count": 1}, {}, "1 message of /odom without a stamp left out"),
+    (
+        "pose_jumps",
+        {"edge": "map → odom", "count": 2, "m": 0.5, "rad": 0.25},
+        {"t": 3.0},
+        "map → odom jumps 2 times, by up to 0.5 m and 0.25 rad, first at t = 3 s: it stays until then, and "
+        "no input is made of it",
+    ),
+    (
+        "parents_differ",
+        {"frame": "base", "parents": "map and odom", "edge": "map → base"},
+        {},
+        "base has several parents in TF: map and odom; read is map → base",
+    ),
+    (
+        "rates_contradict",
+        {"names": ["q1"], "zero": False},
+        {},
+        "q1 contradicts q: differences of q are taken",
+    ),
+    (
+        "rates_contradict",
+        {"names": ["q1", "q2"], "zero": True},
+        {},
+        "q1 and q2 are all 0 while q moves: differences of q are taken",
+    ),
+    (
+        "joint_silent",
+        {"name": "q1"},
+        {"t": 1.0, "last": 9.0},
+        "q1 comes no more after t = 1 s: it stays where it was until 9 s",
+    ),
+    ("values_not_finite", {"name": "q1", "count": 5}, {}, "q1 is no number in 5 messages, left out"),
+    (
+        "child_unnamed",
+        {"topic": "/odom"},
+        {},
+        "/odom does not say whose pose it is: taken for the reference point's",
+    ),
+    (
+        "platform_silent",
+        {},
+        {"t": 1.0, "end": 3.0},
+        "no pose of the platform from t = 1 to 3 s: a straight line in between",
+    ),
+    (
+        "platform_unknown",
+        {"s": 2.0},
+        {},
+        "2 s of joint states, in which the platform's pose is not known, are left out",
+    ),
+]
+
+
+@pytest.mark.parametrize(("code", "values", "where", "sentence"), WORDS)
+def test_what_a_log_s_findings_say(code: str, values: Any, where: Any, sentence: str) -> None:
+    assert str(nmm.Finding(code, values, where)) == sentence
+    assert {one for one, *_ in WORDS} == bag_words.WORDS.keys()

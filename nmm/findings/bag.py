@@ -22,7 +22,7 @@ def _jumps(edge: str, count: int, m: float, rad: float, t: float) -> str:
 
 def _contradict(names: Sequence[str], zero: bool) -> str:
     one = len(names) == 1
-    what = f"{'is' if one else 'are'} all 0 while it moves" if zero else f"contradict{'s' * one} q"
+    what = f"{'is' if one else 'are'} all 0 while q moves" if zero else f"contradict{'s' * one} q"
     return f"{listed(list(names))} {what}: differences of q are taken"
 
 

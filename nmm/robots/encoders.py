@@ -126,7 +126,8 @@ class Turns:
                 short = math.remainder(by, 2.0 * math.pi)
                 far = most[k] if math.isfinite(most[k]) else 0.0
                 if far > math.pi or (far == 0.0 and abs(short) > MOST):
-                    self._refuse(k, "may have turned more than half a turn", max(far, abs(short)))
+                    mend = "readings in shorter intervals, or fastest="
+                    self._refuse(k, "may have turned more than half a turn", mend, max(far, abs(short)))
                 counts[k] = self.counts[k] + short
         return counts
 
@@ -163,7 +164,8 @@ class Turns:
             return False
         if abs(by) > 1.5 * math.pi and short <= (before if self._steps else 0.5 * math.pi):
             return True
-        self._refuse(k, "turned by more than half a turn, or is read within one", abs(by))
+        what = "turned by more than half a turn, or is read within one"
+        self._refuse(k, what, "wrapped=True, or wrapped=False", abs(by))
         return False
 
     def _within(self, k: int, reading: float) -> bool:
@@ -177,7 +179,5 @@ class Turns:
             expected = "an angle in (-π, π] or [0, 2π), as wrapped= says"
             raise InputError(where=f"{self._where}: {self._names[k]}", expected=expected, got=float(reading))
 
-    def _refuse(self, k: int, what: str, by: float) -> None:
-        known = self._wrapped[self._names[k]] is not None
-        expected = "readings in shorter intervals, or fastest=" if known else "wrapped=True, or wrapped=False"
+    def _refuse(self, k: int, what: str, expected: str, by: float) -> None:
         raise InputError(f"{self._names[k]} {what}", where=self._where, expected=expected, got=by)
