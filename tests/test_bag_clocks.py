@@ -104,6 +104,9 @@ def test_live_joint_states_take_what_counts(tmp_path: Path) -> None:
     assert states.stamp == 2.0
     assert states.add(joints(0.0, {"j1": 0.3, "j2": 0.2}), t=7.0)
     assert states.stamp == 7.0
+    torques = joints(8.0, {"j1": None, "fan": None})
+    torques.effort = np.array([1.0, 2.0])
+    assert not states.add(torques)
     assert nmm.ros.joints(joints(1.0, {"fan": None}, [3.0])) == {}
     for wrong in (joints(4.0, {"j1": NAN, "j2": 0.5}), joints(4.0, {"j1": 0.5, "j2": None})):
         with pytest.raises(InputError, match="position"):

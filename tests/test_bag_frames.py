@@ -217,6 +217,9 @@ def test_frames_that_lead_nowhere_are_refused_by_name(tmp_path: Path) -> None:
             nmm.ros.odometry(sent[1][2], robot)
     same = nmm.read_bag(bag(tmp_path, sent), robot, base="t265_pose")  # one's word
     assert not np.any(same.q[:, :3])
+    sent = [one for t in clocked(5) for one in (arm(t), (t, "/odom", odom(t, (0, 0, 0))))]
+    with pytest.raises(InputError, match="base_lnk"):
+        nmm.read_bag(bag(tmp_path, sent), robot, base="base_lnk")
     sent = [one for t in clocked(5) for one in (arm(t), (t, "/odom", odom(t, (0, 0, 0), child=str(t))))]
     with pytest.raises(InputError, match="several frames"):
         nmm.read_bag(bag(tmp_path, sent), robot)

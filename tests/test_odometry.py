@@ -258,7 +258,7 @@ def rolled(steps: Array, turn: str, start: float = 0.0, dt: float | None = None,
 def test_wheels_that_are_read_within_one_turn(
     turn: str, start: float, dt: float | None, options: dict[str, Any]
 ) -> None:
-    """There and back with 20 turns, steps up to 0.5 rad, ahead and on the spot: the way is that by counters."""
+    """There and back, steps up to 0.5 rad, ahead and on the spot: the way is that by counters."""
     phase = np.linspace(0.0, 4 * np.pi, 400)
     steps = np.column_stack([0.5 * np.sin(phase) + 0.02, 0.45 * np.cos(phase)])
     counted = rolled(steps, "on", dt=dt)

@@ -30,6 +30,7 @@ def parts(
     InputError : a known joint twice; not a position for each name
     """
     where, position, velocity = name_of(message), message.position, getattr(message, "velocity", ())
+    others = len(velocity) or len(getattr(message, "effort", ()))
     names = [name if name in known else name.removeprefix(prefix).lstrip("/") for name in message.name]
     at = [i for i, name in enumerate(names) if name in known]
     own = [names[i] for i in at]
@@ -37,7 +38,7 @@ def parts(
     if not own:
         return {}, {}
     count = len(names)
-    whole = len(position) == count or (not len(position) and len(velocity))
+    whole = len(position) == count or (not len(position) and others)
     expect(whole, f"{where}: position", f"{count} numbers, as many as names", len(position))
     positions, velocities = (
         {names[i]: float(values[i]) for i in at} if len(values) == count else {}

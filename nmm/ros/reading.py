@@ -57,8 +57,8 @@ def joints(message: Any) -> dict[str, float]:
     {'q2': 0.5, 'q1': 0.1}
     """
     _field(message, "name")
-    speeds_alone = len(message.position) == 0 < len(getattr(message, "velocity", ()))
-    return {} if speeds_alone else _by_name(message, "position")
+    others = len(getattr(message, "velocity", ())) or len(getattr(message, "effort", ()))
+    return {} if others and not len(message.position) else _by_name(message, "position")
 
 
 def rates(message: Any) -> dict[str, float]:

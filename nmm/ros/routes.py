@@ -7,9 +7,9 @@ from functools import cached_property
 import numpy as np
 
 from nmm.arrays import Array, Flags, Integers
-from nmm.errors import InputError
+from nmm.errors import InputError, no_such
 from nmm.findings import Finding
-from nmm.ros.frames import Edge, Way, fixed_frames, prefixed, reference
+from nmm.ros.frames import Edge, Way, bare, fixed_frames, prefixed, reference
 from nmm.ros.reading import planar_rows
 from nmm.ros.recorded import Recorded
 from nmm.ros.tracks import Track, foretold, jumps_of, poses_at, steps_of
@@ -100,6 +100,11 @@ def routes(recorded: Recorded) -> tuple[Route, Route | None]:
     frames = tree.frames
     world, odom = (prefixed(one, recorded.prefix, frames, (names.map,)) for one in (names.map, names.odom))
     mapped = counted = None
+    fixed, base = fixed_frames(recorded.robot), names.base
+    known = {*frames, *fixed, *([] if edge is None else [edge.child])}
+    spelt = set() if base is None else {bare(base, recorded.prefix), prefixed(base, recorded.prefix, known)}
+    if base is not None and known.isdisjoint(spelt):
+        raise no_such("frame", base, frames or fixed, "base")
     if edge is not None:
         tail = _tail_of(recorded, edge.child)
         counted = Route([(edge, False)], tail, edge.parent, recorded.twists)
