@@ -120,11 +120,6 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     "version_unknown": ({"got": "2.0"}, {"line": 1}, "<robot> version: expected 1.0, 1.1 or 1.2, got '2.0'"),
     "no_links": ({}, {}, "no links (in MJCF: no bodies)"),
     "name_missing": ({"kind": "link"}, {"line": 4}, "a link without a name"),
-    "name_reserved": (
-        {"kind": "joint", "name": "x", "taken_by": "a coordinate"},
-        {"line": 4},
-        "joint 'x': the name is taken by a coordinate",
-    ),
     "name_twice": ({"kind": "link", "name": "c"}, {"line": 4}, "two links named 'c'"),
     "name_unknown": (
         {"kind": "parent link", "got": "uper", "available": ["base", "upper"]},
@@ -368,6 +363,11 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
         {"names": ["package://p/m.stl"]},
         {},
         "shapes left out, their meshes are missing: package://p/m.stl",
+    ),
+    "names_taken": (
+        {"names": {"x": "x_joint", "v": "v_joint"}},
+        {},
+        "renamed, since the platform's coordinates or inputs have these names: x is x_joint, v is v_joint",
     ),
     "base_of_joints": (
         {"names": ["px", "py", "rz"], "platform": "omnidirectional", "limits": {}},

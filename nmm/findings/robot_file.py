@@ -117,7 +117,6 @@ WORDS = placed(
         "version_unknown": "<robot> version: expected 1.0, 1.1 or 1.2, got {got!r}",
         "no_links": "no links (in MJCF: no bodies)",
         "name_missing": "a {kind} without a name",
-        "name_reserved": "{kind} {name!r}: the name is taken by {taken_by}",
         "name_twice": "two {kind}s named {name!r}",
         "name_unknown": lambda *, kind, got, available, **_: str(no_such(kind, got, available)),
         "two_parents": lambda *, name, parents, **_: (

@@ -119,6 +119,10 @@ WORDS = placed(
         "collision_pairs": "{count} collision pairs: none within a body or across one joint",
         "shapes_left_out": _names("shapes left out, their meshes are missing: {names}"),
         "base_of_joints": _base_of_joints,
+        "names_taken": lambda *, names, **_: (
+            "renamed, since the platform's coordinates or inputs have these names: "
+            + few([f"{old} is {new}" for old, new in names.items()])
+        ),
         "arm_mounted": lambda *, name, key, frame, base, prefix, **_: (
             f"{name} mounted{f' as {key}' if key != name else ''} at {frame} of {base}"
             f"{f', its names with the prefix {prefix}' if prefix else ''}"

@@ -18,12 +18,7 @@ from nmm.robots.mimic_joints import MimicJoint
 
 _VERSION = re.compile(r"1\.[012]")
 #: Names of frames that the model gets anyway.
-RESERVED = {
-    "x": "a coordinate",
-    "y": "a coordinate",
-    "theta": "a coordinate",
-    "universe": "Pinocchio's world",
-}
+RESERVED = ("x", "y", "theta", "universe")
 
 
 @dataclass(frozen=True)
@@ -134,8 +129,6 @@ def _check_names(elements: list[Element], kind: str, reader: Attributes) -> None
         name = element.get("name")
         if not name:
             reader.add(element, "name_missing", kind=kind)
-        elif name in RESERVED:
-            reader.add(element, "name_reserved", kind=kind, name=name, taken_by=RESERVED[name])
         elif name in seen:
             reader.add(element, "name_twice", kind=kind, name=name)
         else:

@@ -23,6 +23,16 @@ from nmm.robots.loading.measured_joints import (
     measure_layout,
     speed_limit,
 )
+from nmm.robots.loading.names_apart import (
+    Names,
+    apart,
+    joints_among,
+    name_notes,
+    notes_with,
+    of_file,
+    renamed,
+    with_names,
+)
 from nmm.robots.loading.provenance import Parts
 from nmm.robots.loading.source import Source
 from nmm.robots.loading.virtual_base import VirtualBase, find_virtual_base
@@ -49,6 +59,8 @@ class Options:
 def robot_from(source: Source, options: Options) -> Robot:
     """`RobotError` for an unusable joint, an unknown joint or frame, a platform that does not fit."""
     where, is_fixed = source.where, _is_fixed(source, options)
+    source, names = apart(source)
+    options = _naming(options, names)
     rebuilt = rebuild(source.model, (source.visual_model, source.collision_model), where)
     rebuilt.model.name = options.name or source.name
     stated = options.platform.coordinates[len(CHAIN) :] if isinstance(options.platform, Platform) else ()
@@ -73,23 +85,36 @@ def robot_from(source: Source, options: Options) -> Robot:
     remarks = [*contradictions]
     if base is not None:
         platform = base.limited(platform)
-        remarks.append(base.note(platform))
+        of_base = {new: old for new, old in of_file(names).items() if new in base.joints}
+        rebuilt = replace(rebuilt, notes=notes_with(rebuilt.notes, of_base))
+        remarks += notes_with([base.note(platform)], of_base)
     added = None if layout is None else platform.added_joint(layout)
     if added is not None:
         rebuilt = _with_joint(rebuilt, added, where)
     own = _own_joints(platform, rebuilt.model, made.values, where)
     made = replace(made, rebuilt=_on_platform(rebuilt, platform, own, where))
     if not platform.coordinates:
-        made = _with_held_wheels(made, options.wheels, where)
+        made = renamed(_with_held_wheels(made, options.wheels, where), of_file(names))
+        names = {old: new for old, new in names.items() if old not in CHAIN}
+    like_inputs = joints_among(made.rebuilt.model, platform.inputs)
+    made, names, options = renamed(made, like_inputs), {**names, **like_inputs}, _naming(options, like_inputs)
+    remarks += name_notes(names, () if base is None else base.joints)
     provenance = replace(
         source.provenance,
         locked=made.values,
         mimicked=made.mimicked,
         platform=origin,
         contradictions=contradictions,
+        renamed={**source.provenance.renamed, **names},
     )
     parts = Parts(made.rebuilt.geometries[1], (*source.notes, *made.rebuilt.notes, *remarks), provenance)
     return _without_wheels(made, platform, own, source, options, parts)
+
+
+def _naming(options: Options, names: Names) -> Options:
+    """The options with other names of joints and frames."""
+    given = {key: with_names(getattr(options, key), names) for key in ("lock", "wheels", "axle")}
+    return replace(options, **given)
 
 
 def _axle_placement(model: pin.Model, axle: str | ArrayLike, where: str) -> pin.SE3:

@@ -38,6 +38,7 @@ class Provenance:
     platform : where the kind of platform comes from: "given", "file", "wheels", "base" (of
         joints) or "default"
     contradictions : where the platform is not what the files' wheels and joints are
+    renamed : what joints and links are called here, by their names in the file, where these differ
     """
 
     packages: Mapping[str, Path | None] = field(default_factory=dict)
@@ -49,6 +50,7 @@ class Provenance:
     prefixed: Mapping[str, str] = field(default_factory=dict)
     platform: str = "given"
     contradictions: tuple[Finding, ...] = ()
+    renamed: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def held(self) -> Mapping[str, float]:

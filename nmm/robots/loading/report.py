@@ -134,6 +134,7 @@ def _report(description: Description, given: Mapping[str, Any], found: Sequence[
         robot, problems = _loaded(description.path, given)
     if robot is not None:
         top, ground = _top(root), Ground.of(robot) if robot.platform.coordinates else None
+        warnings += [one for one in robot.notes if one.code == "names_taken"]
         warnings += [*wheel_advice(robot, top), *limit_notes(robot)]
         warnings += [*provenance_of(robot).contradictions, *robot.semantics.notes]
         warnings += [] if ground is None else ground.warnings(robot)

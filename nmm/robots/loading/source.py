@@ -18,7 +18,7 @@ from nmm.errors import RobotError, expect_known, no_such
 from nmm.findings import Finding
 from nmm.findings.robot_file import refusal
 from nmm.robots.loading import mending
-from nmm.robots.loading.chain import mimic_joints_of
+from nmm.robots.loading.chain import CHAIN, mimic_joints_of, replaced_joints
 from nmm.robots.loading.check import CheckedUrdf, inspect
 from nmm.robots.loading.check_parts import mesh_scale, shape_of
 from nmm.robots.loading.description import SUFFIXES, describe
@@ -43,6 +43,7 @@ class Source:
 
     where, label : its name in messages; its file, bundled name, or "pin.Model"
     all_pairs : whether we choose the collision pairs
+    on_chain : whether its first joints x, y, theta are a platform's, not the file's
     mimic_joints : each after its leader
     platform : the kind that the file declares"""
 
@@ -53,6 +54,7 @@ class Source:
     visual_model: pin.GeometryModel
     collision_model: pin.GeometryModel
     all_pairs: bool
+    on_chain: bool = False
     arguments: Mapping[str, str] = field(default_factory=dict)
     mimic_joints: tuple[MimicJoint, ...] = ()
     platform: str | None = None
@@ -121,6 +123,7 @@ def read_model(
         visual_model=_shapes(visual_model, "visual_model", model),
         collision_model=_shapes(collision_model, "collision_model", model),
         all_pairs=False,
+        on_chain=replaced_joints(model) == len(CHAIN),
         mimic_joints=mimic_joints_of(model),
     )
 

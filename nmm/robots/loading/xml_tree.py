@@ -19,6 +19,8 @@ from nmm.robots.loading.budget import MOST_ELEMENTS
 DEEPEST = 200
 #: A description with its meshes beside it is far shorter, bytes.
 LONGEST = 50_000_000
+#: White space before the declaration, which urdfdom, yourdfpy and MuJoCo pass over and expat refuses.
+_LATE = re.compile(r"\A(\s+)(<\?xml\b[^>]*\?>)")
 
 
 class Element(ElementTree.Element):
@@ -35,10 +37,12 @@ class XmlError(Exception):
 
 
 def read_text(path: Path) -> str:
-    """The text of a UTF-8 file; `RobotError` if it cannot be read, FileNotFoundError if it is not there."""
+    """The text of a UTF-8 file, which starts with its XML declaration, if any; `RobotError` if it cannot be
+    read, FileNotFoundError if it is not there."""
     try:
         content = read_bytes(path, LONGEST)
-        return content.decode("utf-8-sig")
+        # Behind the declaration the white space keeps the lines' numbers.
+        return _LATE.sub(r"\2\1", content.decode("utf-8-sig"))
     except FileNotFoundError:
         raise
     except UnicodeDecodeError as error:
