@@ -33,7 +33,7 @@ from nmm.robots.loading.names_apart import (
     renamed,
     with_names,
 )
-from nmm.robots.loading.provenance import Parts
+from nmm.robots.loading.provenance import Parts, acceleration_notes
 from nmm.robots.loading.source import Source
 from nmm.robots.loading.virtual_base import VirtualBase, find_virtual_base
 from nmm.robots.robot import Robot
@@ -105,6 +105,8 @@ def robot_from(source: Source, options: Options) -> Robot:
         mimicked=made.mimicked,
         platform=origin,
         contradictions=contradictions,
+        base=() if base is None or is_fixed else base.joints,
+        accelerations=with_names(source.provenance.accelerations, names),
         renamed={**source.provenance.renamed, **names},
     )
     parts = Parts(made.rebuilt.geometries[1], (*source.notes, *made.rebuilt.notes, *remarks), provenance)
@@ -294,7 +296,7 @@ def _without_wheels(
         parts=replace(parts, provenance=replace(parts.provenance, reduced=tuple(names))),
     )
     casters = steered_casters(robot) if parts.provenance.platform == "default" else ()
-    remarks = (*limit_notes(robot), *slip_warnings(robot), *casters)
+    remarks = (*limit_notes(robot), *acceleration_notes(robot), *slip_warnings(robot), *casters)
     return replace(robot, **robot.shapes._asdict(), notes=(*robot.notes, *remarks))
 
 

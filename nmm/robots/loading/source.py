@@ -97,8 +97,13 @@ def read_file(
         arguments=description.arguments,
         mimic_joints=checked.mimic_joints,
         platform=checked.platform,
-        notes=(*description.notes, *left_out, *packages.notes, *_spared(checked.spared)),
-        provenance=Provenance(dict(packages.found), packages.searched, meshes),
+        notes=(
+            *(*description.notes, *left_out, *packages.notes, *_spared(checked.spared)),
+            *description.placed(checked.unread),
+        ),
+        provenance=Provenance(
+            dict(packages.found), packages.searched, meshes, accelerations=checked.accelerations
+        ),
     )
 
 
