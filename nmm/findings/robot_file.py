@@ -89,7 +89,9 @@ def _times(count: int, given: Mapping[str, object]) -> str:
     return f" ({often}{line})" if often or line else ""
 
 
-def _unknown(*, element: str, near: str, count: int, inside: str = "", attribute: str = "", **given: object) -> str:
+def _unknown(
+    *, element: str, near: str, count: int, inside: str = "", attribute: str = "", **given: object
+) -> str:
     what = f"<{element}> {attribute}" if attribute else f"<{element}> in <{inside}>"
     meant = f": did you mean {near}?" if near else ""
     return f"{what}{_times(count, given)} is not known and does not count{meant}"
@@ -98,8 +100,8 @@ def _unknown(*, element: str, near: str, count: int, inside: str = "", attribute
 def _soft_limits(*, limits: Mapping[str, Sequence[float]], count: int, **given: object) -> str:
     soft = [f"{name}: [{low:g}, {high:g}]" for name, (low, high) in limits.items()]
     return (
-        f"soft limits of <safety_controller>{_times(count, given)} are not kept: {few(soft)}; given as limits "
-        "of position (Limits(position=...), limits: position:) they are"
+        f"soft limits of <safety_controller>{_times(count, given)} are not kept: {few(soft)}; they are where "
+        "given as limits of position (Limits(position=...))"
     )
 
 

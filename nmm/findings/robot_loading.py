@@ -186,7 +186,7 @@ WORDS = placed(
         ),
         "state_not_numbers": lambda *, name, got, **_: f"joint {name}: expected numbers, got {quoted(got)}",
         "posture_joints_unknown": _names("posture {posture}: no such joints: {names}"),
-        "posture_of_base": _names("posture {posture}: x, y, theta stand for {names}, whose values do not count"),
+        "posture_of_base": _names("posture {posture}: in place of {names} are x, y, theta: left out"),
         "groups_without_inputs": _names("groups that move by no input: {names}"),
         "srdf_names_unknown": _names("no such links, joints or groups: {names}"),
         "virtual_joint_unused": "virtual joint {name} does not count: {link} is not the root link",

@@ -16,7 +16,7 @@ READ, NOTED, WITHOUT_EFFECT = "read", "noted", "without effect"
 
 
 class How(NamedTuple):
-    """What becomes of an attribute: `READ` from version 1.`since` on, `NOTED` or `WITHOUT_EFFECT`; and why."""
+    """What becomes of an attribute from version 1.`since` on, and why."""
 
     how: str
     why: str = ""
@@ -78,6 +78,7 @@ _SHAPES = {
 }
 _CONTACT = Part(WITHOUT_EFFECT, "contacts of simulators")
 _MUJOCO = Part(NOTED, "of <mujoco> in a URDF only the folder of the meshes is read")
+_OF_MUJOCO = ("default", "asset", "equality", "tendon", "actuator", "sensor", "keyframe", "worldbody")
 
 
 def _below(path: str, parts: Table) -> dict[str, Part]:
@@ -158,13 +159,7 @@ URDF: Table = {
         (f"robot/mujoco/{tag}" for tag in ("option", "size", "visual", "statistic")),
         Part(WITHOUT_EFFECT, "for MuJoCo"),
     ),
-    **dict.fromkeys(
-        (
-            f"robot/mujoco/{tag}"
-            for tag in ("default", "asset", "equality", "tendon", "actuator", "sensor", "keyframe", "worldbody")
-        ),
-        _MUJOCO,
-    ),
+    **{f"robot/mujoco/{tag}": _MUJOCO for tag in _OF_MUJOCO},
 }
 
 SRDF: Table = {
@@ -211,7 +206,7 @@ def unread(root: Element, table: Table, minor: int = 0) -> list[Finding]:
 
 def _walk(element: Element, path: str, table: Table, minor: int) -> Iterator[tuple[_Seen, int]]:
     part = table[path]
-    for name in element.keys():
+    for name in element.attrib:
         if not name.startswith(("xmlns", "xml:")):
             how = part.attributes.get(name)
             if (seen := _attribute(element.tag, name, how, part, minor)) is not None:

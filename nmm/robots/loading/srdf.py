@@ -32,7 +32,7 @@ class Group(NamedTuple):
 
 
 class VirtualJoint(NamedTuple):
-    """A joint that an SRDF adds between the world and a link; `motion` is how it says that it moves, or ""."""
+    """A joint that an SRDF adds between the world and a link; `motion` is how it moves there, or ""."""
 
     name: str
     kind: str
@@ -45,8 +45,8 @@ class Srdf(NamedTuple):
 
     states : each state's joint values; states of one name are merged
     disabled, enabled : pairs of links
-    untouched : links that may touch all others but for enabled pairs
     roots : joints that it adds between the world and the robot
+    untouched : links that may touch all others but for enabled pairs
     passive : joints without a motor
     notes : what of it does not count"""
 
@@ -54,11 +54,11 @@ class Srdf(NamedTuple):
     states: Mapping[str, Mapping[str, tuple[float, ...]]]
     groups: Mapping[str, Group]
     disabled: tuple[tuple[str, str], ...]
-    enabled: tuple[tuple[str, str], ...]
-    untouched: tuple[str, ...]
     roots: tuple[VirtualJoint, ...]
-    passive: tuple[str, ...]
-    notes: tuple[Finding, ...]
+    enabled: tuple[tuple[str, str], ...] = ()
+    untouched: tuple[str, ...] = ()
+    passive: tuple[str, ...] = ()
+    notes: tuple[Finding, ...] = ()
 
 
 def read_srdf(
@@ -107,12 +107,8 @@ def read_srdf(
         name, kind = _attribute(one, "name", path), one.get("type", "planar").strip().lower()
         roots.append(VirtualJoint(name, kind, one.get("child_link", "").strip(), motions.get(name, "")))
     place = {"srdf": path.name}
-    notes = (
-        replace(one, where=place if is_xacro else {**one.where, **place}) for one in unread(root, SRDF)
-    )
-    return Srdf(
-        path, states, groups, disabled, enabled, untouched, tuple(roots), passive, tuple(notes)
-    )
+    notes = (replace(one, where=place if is_xacro else {**one.where, **place}) for one in unread(root, SRDF))
+    return Srdf(path, states, groups, disabled, tuple(roots), enabled, untouched, passive, tuple(notes))
 
 
 def srdf_beside(file: Path, robot: str) -> Path | None:

@@ -150,7 +150,8 @@ def _root_notes(srdf: Srdf, robot: Robot) -> Iterator[Finding]:
         elif root.kind == "planar" and root.motion and robot.platform.coordinates:
             slides = bool(np.any(robot.platform.G(np.zeros(robot.platform.n_p))[1]))
             if slides != (root.motion == "holonomic"):
-                yield _note("motion_model_differs", name=root.name, model=root.motion, platform=robot.platform.name)
+                about = {"name": root.name, "model": root.motion, "platform": robot.platform.name}
+                yield _note("motion_model_differs", **about)
 
 
 def _is_of_root(link: str, robot: Robot) -> bool:
