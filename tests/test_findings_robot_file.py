@@ -432,14 +432,14 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
         "SRDF a.srdf: no such links, joints or groups: lnk, jnt",
     ),
     "virtual_joint_unused": (
-        {"name": "odom", "link": "hand"},
+        {"name": "odom", "child": "hand"},
         {"srdf": "a.srdf"},
         "SRDF a.srdf: virtual joint odom does not count: hand is not the root link",
     ),
     "motion_model_differs": (
         {"name": "odom", "model": "holonomic", "platform": "unicycle"},
         {"srdf": "a.srdf"},
-        "SRDF a.srdf: virtual joint odom has the motion model holonomic, unlike platform unicycle",
+        "SRDF a.srdf: virtual joint odom has motion model holonomic, unlike platform unicycle",
     ),
     "posture_of_base": (
         {"posture": "home", "names": ["px", "py"]},

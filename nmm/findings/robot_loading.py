@@ -189,8 +189,8 @@ WORDS = placed(
         "posture_of_base": _names("posture {posture}: in place of {names} are x, y, theta: left out"),
         "groups_without_inputs": _names("groups that move by no input: {names}"),
         "srdf_names_unknown": _names("no such links, joints or groups: {names}"),
-        "virtual_joint_unused": "virtual joint {name} does not count: {link} is not the root link",
-        "motion_model_differs": "virtual joint {name} has the motion model {model}, unlike platform {platform}",
+        "virtual_joint_unused": "virtual joint {name} does not count: {child} is not the root link",
+        "motion_model_differs": "virtual joint {name} has motion model {model}, unlike platform {platform}",
         "passive_held": lambda *, values, **_: (
             "joints without a motor have no input and are held: "
             + few([f"{name} at {value:g}" for name, value in values.items()])

@@ -59,8 +59,8 @@ def rebuild(
 
     The chain carries all of a fixed base, replaces a planar or free root (z, roll, pitch zero) or is there.
     Joints in `first` precede their siblings; `root` places the root link in the chain's last joint (or in the
-    world); `reversed_joints`, which only turn, get the opposite axis and sign; `replaced` joints, where
-    x, y, theta are no chain (see `replaced_joints`). `RobotError` for a joint with several degrees of freedom,
+    world); `reversed_joints`, which only turn, get the opposite axis and sign; `replaced` joints, if
+    x, y, theta are no chain (see `replaced_joints`). `RobotError` for a joint with several degrees of freedom
     or a name of the chain's."""
     placement = pin.SE3.Identity() if root is None else root
     count = replaced_joints(source) if replaced is None else replaced

@@ -146,7 +146,7 @@ def _root_notes(srdf: Srdf, robot: Robot) -> Iterator[Finding]:
     """On virtual joints that the robot does not have: elsewhere than at its root, or on another platform."""
     for root in srdf.roots:
         if root.child and not _is_of_root(root.child, robot):
-            yield _note("virtual_joint_unused", name=root.name, link=root.child)
+            yield _note("virtual_joint_unused", name=root.name, child=root.child)
         elif root.kind == "planar" and root.motion and robot.platform.coordinates:
             slides = bool(np.any(robot.platform.G(np.zeros(robot.platform.n_p))[1]))
             if slides != (root.motion == "holonomic"):
