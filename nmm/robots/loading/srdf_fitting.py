@@ -126,7 +126,8 @@ def _fitted(srdf: Srdf, robot: Robot, *, strict: bool) -> Semantics:
     groups = _groups(srdf.groups, robot, base)
     if still := [name for name in srdf.groups if name not in groups]:
         notes.append(_note("groups_without_inputs", names=still))
-    if strange := [*dict.fromkeys(one for one in _members_named(srdf) if one not in known | roots)]:
+    parts = {*robot.frames, *known, *roots}
+    if strange := [*dict.fromkeys(one for one in _members_named(srdf) if one not in parts)]:
         notes.append(_note("srdf_names_unknown", names=strange))
     notes += _root_notes(srdf, robot)
     of_file = tuple(replace(note, where={"srdf": srdf.path.name}) for note in notes)
@@ -172,9 +173,9 @@ def _base(srdf: Srdf, robot: Robot) -> set[str]:
 
 
 def _joints(robot: Robot) -> set[str]:
-    """Every joint and link of the robot's file: coordinates, wheels, and fixed ones."""
+    """Every joint of the robot's file: coordinates, wheels, and fixed ones."""
     both = (*robot.model.frames, *robot.display_model.frames)
-    return {frame.name for frame in both} - {"universe"}
+    return {frame.name for frame in both if frame.type in _JOINTS} - {"universe"}
 
 
 def _coordinates(
