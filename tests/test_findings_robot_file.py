@@ -120,11 +120,6 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     "version_unknown": ({"got": "2.0"}, {"line": 1}, "<robot> version: expected 1.0, 1.1 or 1.2, got '2.0'"),
     "no_links": ({}, {}, "no links (in MJCF: no bodies)"),
     "name_missing": ({"kind": "link"}, {"line": 4}, "a link without a name"),
-    "name_reserved": (
-        {"kind": "joint", "name": "x", "taken_by": "a coordinate"},
-        {"line": 4},
-        "joint 'x': the name is taken by a coordinate",
-    ),
     "name_twice": ({"kind": "link", "name": "c"}, {"line": 4}, "two links named 'c'"),
     "name_unknown": (
         {"kind": "parent link", "got": "uper", "available": ["base", "upper"]},
@@ -368,6 +363,93 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
         {"names": ["package://p/m.stl"]},
         {},
         "shapes left out, their meshes are missing: package://p/m.stl",
+    ),
+    "turned_twice": (
+        {},
+        {"line": 4, "joint": "j"},
+        "joint 'j': <origin> has both rpy and quat_xyzw, expected one of them",
+    ),
+    "quaternion_zero": (
+        {},
+        {"line": 4, "joint": "j"},
+        "joint 'j': <origin> quat_xyzw is zero: no rotation has it",
+    ),
+    "element_unknown": (
+        {"element": "limt", "inside": "joint", "near": "limit", "count": 3},
+        {"line": 4},
+        "<limt> in <joint> (3 times, first in line 4) is not known and does not count: did you mean limit?",
+    ),
+    "attribute_unknown": (
+        {"element": "axis", "attribute": "rpy", "near": "", "count": 1},
+        {"line": 4},
+        "<axis> rpy (line 4) is not known and does not count",
+    ),
+    "element_unread": (
+        {"element": "loop_joint", "inside": "robot", "why": "the loop stays open", "count": 2},
+        {},
+        "<loop_joint> (2 times) is not read: the loop stays open",
+    ),
+    "attribute_unread": (
+        {"element": "limit", "attribute": "jerk", "why": "jerk is not limited", "count": 1},
+        {"srdf": "a.srdf"},
+        "SRDF a.srdf: <limit> jerk is not read: jerk is not limited",
+    ),
+    "element_again": (
+        {"element": "limit", "inside": "joint", "count": 1},
+        {"line": 4},
+        "a further <limit> in one <joint> (line 4) does not count: the first does",
+    ),
+    "soft_limits": (
+        {"limits": {"j": [-1.5, 2.0]}, "count": 1},
+        {"line": 4},
+        "soft limits of <safety_controller> (line 4) are not kept: j: [-1.5, 2]; they are where given as "
+        "limits of position (Limits(position=...))",
+    ),
+    "limits_of_continuous": (
+        {"names": ["j", "k"], "count": 2},
+        {"line": 4},
+        "<limit> lower and upper (2 times, first in line 4) do not count at continuous joints: j, k",
+    ),
+    "accelerations_of_file": (
+        {"limits": {"j": 3.0, "k": 0.25}},
+        {},
+        "limits of acceleration in the file, which only Limits(acceleration=...) keeps, in scenarios limits: "
+        "acceleration: j: 3, k: 0.25",
+    ),
+    "passive_held": (
+        {"values": {"j": 0.0}},
+        {"srdf": "a.srdf"},
+        "SRDF a.srdf: joints without a motor have no input and are held: j at 0 (lock for another value)",
+    ),
+    "groups_without_inputs": (
+        {"names": ["hand"]},
+        {"srdf": "a.srdf"},
+        "SRDF a.srdf: groups that move by no input: hand",
+    ),
+    "srdf_names_unknown": (
+        {"names": ["lnk", "jnt"]},
+        {"srdf": "a.srdf"},
+        "SRDF a.srdf: no such links, joints or groups: lnk, jnt",
+    ),
+    "virtual_joint_unused": (
+        {"name": "odom", "child": "hand"},
+        {"srdf": "a.srdf"},
+        "SRDF a.srdf: virtual joint odom does not count: hand is not the root link",
+    ),
+    "motion_model_differs": (
+        {"name": "odom", "model": "holonomic", "platform": "unicycle"},
+        {"srdf": "a.srdf"},
+        "SRDF a.srdf: virtual joint odom has motion model holonomic, unlike platform unicycle",
+    ),
+    "posture_of_base": (
+        {"posture": "home", "names": ["px", "py"]},
+        {"srdf": "a.srdf"},
+        "SRDF a.srdf: posture home: in place of px, py are x, y, theta: left out",
+    ),
+    "names_taken": (
+        {"names": {"x": "x_joint", "v": "v_joint"}},
+        {},
+        "renamed, since the platform's coordinates or inputs have these names: x is x_joint, v is v_joint",
     ),
     "base_of_joints": (
         {"names": ["px", "py", "rz"], "platform": "omnidirectional", "limits": {}},

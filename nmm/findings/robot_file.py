@@ -82,6 +82,34 @@ def _numbers(values: Sequence[float]) -> str:
     return ", ".join(f"{value:.3g}" for value in values)
 
 
+def _times(count: int, given: Mapping[str, object]) -> str:
+    """How often, and where first."""
+    line = f"line {given['line']}" if "line" in given else ""
+    often = f"{count} times{', first in ' if line else ''}" if count > 1 else ""
+    return f" ({often}{line})" if often or line else ""
+
+
+def _unknown(
+    *, element: str, near: str, count: int, inside: str = "", attribute: str = "", **given: object
+) -> str:
+    what = f"<{element}> {attribute}" if attribute else f"<{element}> in <{inside}>"
+    meant = f": did you mean {near}?" if near else ""
+    return f"{what}{_times(count, given)} is not known and does not count{meant}"
+
+
+def _soft_limits(*, limits: Mapping[str, Sequence[float]], count: int, **given: object) -> str:
+    soft = [f"{name}: [{low:g}, {high:g}]" for name, (low, high) in limits.items()]
+    return (
+        f"soft limits of <safety_controller>{_times(count, given)} are not kept: {few(soft)}; they are where "
+        "given as limits of position (Limits(position=...))"
+    )
+
+
+def _unread(*, element: str, why: str, count: int, attribute: str = "", **given: object) -> str:
+    what = f"<{element}> {attribute}" if attribute else f"<{element}>"
+    return f"{what}{_times(count, given)} is not read: {why}"
+
+
 WORDS = placed(
     {
         # ------------------------------------------------------------------ a text that is no description
@@ -117,7 +145,6 @@ WORDS = placed(
         "version_unknown": "<robot> version: expected 1.0, 1.1 or 1.2, got {got!r}",
         "no_links": "no links (in MJCF: no bodies)",
         "name_missing": "a {kind} without a name",
-        "name_reserved": "{kind} {name!r}: the name is taken by {taken_by}",
         "name_twice": "two {kind}s named {name!r}",
         "name_unknown": lambda *, kind, got, available, **_: str(no_such(kind, got, available)),
         "two_parents": lambda *, name, parents, **_: (
@@ -164,6 +191,20 @@ WORDS = placed(
         "axis_zero": "<axis> xyz is zero: {got!r}",
         "limit_missing": "a {kind} joint needs a <limit>, this one has none",
         "limits_crossed": "<limit> lower {lower:g} is above upper {upper:g}",
+        "turned_twice": "<origin> has both rpy and quat_xyzw, expected one of them",
+        "quaternion_zero": "<origin> quat_xyzw is zero: no rotation has it",
+        # ------------------------------------------------------------------ what does not count
+        "element_unknown": _unknown,
+        "attribute_unknown": _unknown,
+        "element_unread": _unread,
+        "attribute_unread": _unread,
+        "element_again": lambda *, element, inside, count, **given: (
+            f"a further <{element}> in one <{inside}>{_times(count, given)} does not count: the first does"
+        ),
+        "soft_limits": _soft_limits,
+        "limits_of_continuous": lambda *, names, count, **given: (
+            f"<limit> lower and upper{_times(count, given)} do not count at continuous joints: {few(names)}"
+        ),
         "dynamics_empty": "<dynamics> has neither damping nor friction",
         # ------------------------------------------------------------------ what is odd
         "mass_large": "a mass of {mass:g} kg: is that meant?",
@@ -209,4 +250,4 @@ def refusal(file: object, *findings: Finding, lines: bool = True) -> RobotError:
 
 def line_of(finding: Finding) -> int | None:
     """The line in the file itself, not in one that it includes."""
-    return None if "file" in finding.where else finding.where.get("line")
+    return None if {"file", "srdf"} & finding.where.keys() else finding.where.get("line")

@@ -34,6 +34,11 @@ class Coordinates:
         return {} if self.parts is None else dict(self.parts.provenance.held)
 
     @property
+    def renamed(self) -> Mapping[str, str]:
+        """The names of joints and links that have another name in the file, by that name (`load`)."""
+        return {} if self.parts is None else dict(self.parts.provenance.renamed)
+
+    @property
     def postures(self) -> NamedPostures:
         """The SRDF's named postures: the coordinates that each sets, m and rad; `q` takes them by name."""
         return self.semantics.postures

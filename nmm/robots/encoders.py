@@ -31,6 +31,7 @@ class Encoders:
     def __init__(self, robot: Robot) -> None:
         self.robot, self.where = robot, f"q_from: {robot.name}"
         self.own = robot.q_names[min(3, robot.platform.n_p) :]
+        self._renamed = robot.renamed
         self._signs = dict.fromkeys(robot.reversed_joints, -1.0)
         self._steered = steered_wheels(robot)
         self._passive = {joint for wheel in robot.wheels for joint in wheel.joints}
@@ -45,6 +46,7 @@ class Encoders:
         steering: dict[str, list[float]] = {}
         for name, given in joints.items():
             value = scalar(given, f"{where}: joint {name}")
+            name = self._renamed.get(name, name)
             if name in own:
                 values[name] = self._signs.get(name, 1.0) * value
             elif name in self._steered:

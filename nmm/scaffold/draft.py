@@ -14,6 +14,7 @@ import numpy as np
 from nmm.errors import InputError, NmmError, RunError, ScenarioError
 from nmm.robots.configuration import Configuration
 from nmm.robots.loading.ground import slip_warnings
+from nmm.robots.loading.provenance import accelerations_of
 from nmm.robots.robot import Robot
 from nmm.runs.trajectory import Outcome, Trajectory
 from nmm.scaffold.end_effector import Hand, HandsPath, hands, paths
@@ -133,7 +134,7 @@ def _scenarios(chosen: Chosen, hand: Hand, start: Start) -> Iterator[tuple[dict[
                     "task": f"The frame is {hand.why}. The {path.reference['kind']}: {path.why}.",
                     "objective": "" if hand.joints else "No objective: there is no arm to keep in a posture.",
                     "resolver": why,
-                    **({} if _has_limits(robot) else {"limits": _NO_LIMITS}),
+                    **({} if _has_limits(robot) or accelerations_of(robot) else {"limits": _NO_LIMITS}),
                 },
             )
 
@@ -175,8 +176,9 @@ def _data(chosen: Chosen, hand: Hand, start: Start, path: HandsPath, kind: str) 
     if share < 1.0:
         resolver["weights"] = {"platform": share}
     data["resolver"] = resolver
-    if _has_limits(robot):
-        data["limits"] = True
+    rates = {name: round(limit, 6) for name, limit in accelerations_of(robot).items()}
+    if rates or _has_limits(robot):
+        data["limits"] = {"acceleration": rates} if rates else True
     return data
 
 

@@ -7,7 +7,7 @@ import io
 import os
 import re
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -22,7 +22,7 @@ from nmm.findings.robot_file import refusal
 from nmm.robots.loading.budget import STEPS_OF_A_FILE, BeyondBound, Budget, counted_xacro
 from nmm.robots.loading.mjcf import urdf_of
 from nmm.robots.loading.packages import Packages
-from nmm.robots.loading.xml_tree import XmlError, parse, read_text
+from nmm.robots.loading.xml_tree import Element, XmlError, parse, read_text
 from nmm.text_format import listed, one_line
 
 SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf")
@@ -47,6 +47,10 @@ class Description:
     arguments: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[Finding, ...] = ()
 
+    def placed(self, found: Iterable[Finding]) -> list[Finding]:
+        """Findings in its text, without their lines where these are not the file's."""
+        return [replace(one, where={}) if self.expanded else one for one in found]
+
 
 def describe(
     path: str | Path, arguments: Mapping[str, object] | None = None, package_dirs: Sequence[str | Path] = ()
@@ -67,6 +71,8 @@ def describe(
         for name in texts:
             expect_known("xacro argument", name, used, file, RobotError)
         notes = tuple(Finding("xacro_warned", {"text": text}) for text in warnings)
+        if "<mujoco" in xml:
+            packages.mesh_folder = _mesh_folder(parse(xml))
         return Description(xml, file, packages, expanded=True, arguments=used, notes=notes)
     if texts:
         what = f"arguments ({', '.join(texts)}) are for .xacro files, others have none"
@@ -79,7 +85,14 @@ def describe(
         if root.tag == "mujoco":
             xml, notes = urdf_of(root, file)
             return Description(xml, file, packages, expanded=True, notes=notes)
+        packages.mesh_folder = _mesh_folder(root)
     return Description(text, file, packages)
+
+
+def _mesh_folder(root: Element) -> str | None:
+    """The folder of the meshes that a URDF names to MuJoCo, if it does."""
+    compiler = root.find("mujoco/compiler")
+    return None if compiler is None else compiler.get("meshdir", compiler.get("assetdir"))
 
 
 def _without_comments(text: str) -> str:

@@ -88,7 +88,7 @@ def with_locked(
     """The model with joints of `lock` (see `load`) and of `standing` (no note) fixed on the body above them;
     `RobotError` for no joint, one of the platform's `own`, and no number or one outside the limits."""
     model = rebuilt.model
-    free = [str(name) for name in model.names][len(CHAIN) + 1 :]
+    free = [str(name) for name in list(model.names)[1:] if name not in CHAIN]  # a fixed base has no chain
     lock = _named(lock, [name for name in free if name not in own], mimic_joints, where)
     values = {name: _value(name, value, free, own, where) for name, value in lock.items()}
     for name, value in values.items():

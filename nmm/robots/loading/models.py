@@ -27,7 +27,17 @@ from nmm.robots.loading.measured_joints import (
     speed_limit,
     without_radius,
 )
-from nmm.robots.loading.provenance import Parts
+from nmm.robots.loading.names_apart import (
+    Names,
+    apart,
+    joints_among,
+    name_notes,
+    notes_with,
+    of_file,
+    renamed,
+    with_names,
+)
+from nmm.robots.loading.provenance import Parts, acceleration_notes
 from nmm.robots.loading.source import Source
 from nmm.robots.loading.virtual_base import VirtualBase, find_virtual_base
 from nmm.robots.loading.wheel_search import find_undercarriage
@@ -56,6 +66,8 @@ def robot_from(source: Source, options: Options) -> Robot:
     """`RobotError` for an unusable joint, an unknown joint or frame, a platform that does not fit, wheels
     that leave open how they drive."""
     where, is_fixed = source.where, _is_fixed(source, options)
+    source, names = apart(source)
+    options = _naming(options, names)
     rebuilt = rebuild(source.model, (source.visual_model, source.collision_model), where)
     rebuilt.model.name = options.name or source.name
     stated = options.platform.coordinates[len(CHAIN) :] if isinstance(options.platform, Platform) else ()
@@ -83,7 +95,9 @@ def robot_from(source: Source, options: Options) -> Robot:
     remarks = [*undercarriage.notes(), *chosen.remarks]
     if base is not None:
         platform = base.limited(platform)
-        remarks.append(base.note(platform))
+        of_base = {new: old for new, old in of_file(names).items() if new in base.joints}
+        made = replace(made, rebuilt=replace(made.rebuilt, notes=notes_with(made.rebuilt.notes, of_base)))
+        remarks += notes_with([base.note(platform)], of_base)
     rebuilt = made.rebuilt
     added = None if layout is None else platform.added_joint(layout)
     if added is not None:
@@ -91,16 +105,23 @@ def robot_from(source: Source, options: Options) -> Robot:
     own = _own_joints(platform, rebuilt.model, made.values, where)
     made = replace(made, rebuilt=_on_platform(rebuilt, platform, own, where))
     if not platform.coordinates:
-        made = _with_held_wheels(made, options.wheels, source)
+        made = renamed(_with_held_wheels(made, options.wheels, source), of_file(names))
+        names = {old: new for old, new in names.items() if old not in CHAIN}
     elif layout is not None:
         made, more = _with_idle_parts_held(made, layout, own, source)
         remarks += more
+    like_inputs = joints_among(made.rebuilt.model, platform.inputs)
+    made, names, options = renamed(made, like_inputs), {**names, **like_inputs}, _naming(options, like_inputs)
+    remarks += name_notes(names, () if base is None else base.joints)
     provenance = replace(
         source.provenance,
         locked=made.values,
         mimicked=made.mimicked,
         platform=chosen.origin,
         contradictions=chosen.contradictions,
+        base=() if base is None or is_fixed else base.joints,
+        accelerations=with_names(source.provenance.accelerations, names),
+        renamed={**source.provenance.renamed, **names},
     )
     parts = Parts(made.rebuilt.geometries[1], (*source.notes, *made.rebuilt.notes, *remarks), provenance)
     sliding = () if layout is None else _sliding(layout)
@@ -125,6 +146,12 @@ def _moved(made: Locked, placement: pin.SE3, where: str) -> Locked:
     reached = {"at": (placement.translation + 0.0).tolist(), "yaw": _yaw(placement)}
     notes = (*rebuilt.notes, Finding("reference_moved", reached))
     return replace(made, rebuilt=replace(moved, notes=notes))
+
+
+def _naming(options: Options, names: Names) -> Options:
+    """The options with other names of joints and frames."""
+    given = {key: with_names(getattr(options, key), names) for key in ("lock", "wheels", "axle", "steer")}
+    return replace(options, **given)
 
 
 def _axle_placement(model: pin.Model, axle: str | ArrayLike, where: str) -> pin.SE3:
@@ -333,7 +360,7 @@ def _without_wheels(
         mimic_joints=mimic_joints,
         parts=replace(parts, provenance=replace(parts.provenance, reduced=tuple(names))),
     )
-    remarks = (*limit_notes(robot), *slip_warnings(robot))
+    remarks = (*limit_notes(robot), *acceleration_notes(robot), *slip_warnings(robot))
     return replace(robot, **robot.shapes._asdict(), notes=(*robot.notes, *remarks))
 
 

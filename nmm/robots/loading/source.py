@@ -18,7 +18,7 @@ from nmm.errors import RobotError, expect_known, no_such
 from nmm.findings import Finding
 from nmm.findings.robot_file import refusal
 from nmm.robots.loading import mending
-from nmm.robots.loading.chain import mimic_joints_of
+from nmm.robots.loading.chain import CHAIN, mimic_joints_of, replaced_joints
 from nmm.robots.loading.check import CheckedUrdf, inspect
 from nmm.robots.loading.check_parts import mesh_scale, shape_of
 from nmm.robots.loading.description import SUFFIXES, describe
@@ -45,6 +45,7 @@ class Source:
 
     where, label : its name in messages; its file, bundled name, or "pin.Model"
     all_pairs : whether we choose the collision pairs
+    on_chain : whether its first joints x, y, theta are a platform's, not the file's
     mimic_joints : each after its leader
     platform : the kind that the file declares
     marks : what the file's text says of its drive; undercarriage: what its wheels hang on, once found"""
@@ -56,6 +57,7 @@ class Source:
     visual_model: pin.GeometryModel
     collision_model: pin.GeometryModel
     all_pairs: bool
+    on_chain: bool = False
     arguments: Mapping[str, str] = field(default_factory=dict)
     mimic_joints: tuple[MimicJoint, ...] = ()
     platform: str | None = None
@@ -100,8 +102,13 @@ def read_file(
         arguments=description.arguments,
         mimic_joints=checked.mimic_joints,
         platform=checked.platform,
-        notes=(*description.notes, *left_out, *packages.notes, *_spared(checked.spared)),
-        provenance=Provenance(dict(packages.found), packages.searched, meshes),
+        notes=(
+            *(*description.notes, *left_out, *packages.notes, *_spared(checked.spared)),
+            *description.placed(checked.unread),
+        ),
+        provenance=Provenance(
+            dict(packages.found), packages.searched, meshes, accelerations=checked.accelerations
+        ),
         marks=drive_marks(checked.root),
     )
 
@@ -127,6 +134,7 @@ def read_model(
         visual_model=_shapes(visual_model, "visual_model", model),
         collision_model=_shapes(collision_model, "collision_model", model),
         all_pairs=False,
+        on_chain=replaced_joints(model) == len(CHAIN),
         mimic_joints=mimic_joints_of(model),
     )
 
