@@ -14,7 +14,7 @@ from nmm.platforms import Platform, platform_by_name
 from nmm.robots.loading.models import Options, robot_from
 from nmm.robots.loading.packages import PACKAGE, package_file
 from nmm.robots.loading.source import read_file, read_model, source_path
-from nmm.robots.loading.srdf import with_srdf
+from nmm.robots.loading.srdf import with_srdf, with_states
 from nmm.robots.robot import Robot
 
 
@@ -107,4 +107,7 @@ def load(
         what = "they are for a pin.Model: a file holds its own shapes"
         raise RobotError(what, where="visual_model, collision_model")
     read = read_file(source, arguments, folders, options.lock, missing_meshes)
-    return with_srdf(robot_from(read, options), srdf, source_path(source, folders), read.name)
+    robot = robot_from(read, options)
+    if read.mjcf is not None:
+        robot = with_states(robot, read.mjcf.states, read.mjcf.start)
+    return with_srdf(robot, srdf, source_path(source, folders), read.name)

@@ -22,6 +22,7 @@ from nmm.robots.loading.chain import mimic_joints_of
 from nmm.robots.loading.check import CheckedUrdf, inspect
 from nmm.robots.loading.check_parts import mesh_scale, shape_of
 from nmm.robots.loading.description import SUFFIXES, describe
+from nmm.robots.loading.mjcf import Converted
 from nmm.robots.loading.packages import PACKAGE, package_file
 from nmm.robots.loading.provenance import Provenance
 from nmm.robots.loading.xml_tree import Element, child, children
@@ -44,7 +45,7 @@ class Source:
     where, label : its name in messages; its file, bundled name, or "pin.Model"
     all_pairs : whether we choose the collision pairs
     mimic_joints : each after its leader
-    platform : the kind that the file declares"""
+    platform : the kind that the file declares; mjcf : what a file of MuJoCo's says besides"""
 
     name: str
     where: str
@@ -58,6 +59,7 @@ class Source:
     platform: str | None = None
     notes: tuple[Finding, ...] = ()
     provenance: Provenance = field(default_factory=Provenance)
+    mjcf: Converted | None = None
 
 
 def read_file(
@@ -78,10 +80,12 @@ def read_file(
             return found
         return meshes.setdefault(name, None if isinstance(found, Finding) else found)
 
-    checked, problems = inspect(description.xml, find_mesh, lock)
+    checked, problems = inspect(description.urdf, find_mesh, lock)
     if checked is None or problems:
         raise refusal(where, *problems, lines=not description.expanded)
     model, visual, collision = _pinocchio_models(checked, where)
+    for joint, armature in ({} if description.mjcf is None else description.mjcf.armature).items():
+        model.armature[model.joints[model.getJointId(joint)].idx_v] = armature
     missing = [name for name, file in meshes.items() if file is None]
     left_out = [Finding("shapes_left_out", {"names": missing})] if missing else []
     return Source(
@@ -97,6 +101,7 @@ def read_file(
         platform=checked.platform,
         notes=(*description.notes, *left_out, *packages.notes, *_spared(checked.spared)),
         provenance=Provenance(dict(packages.found), packages.searched, meshes),
+        mjcf=description.mjcf,
     )
 
 

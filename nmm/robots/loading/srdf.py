@@ -137,7 +137,41 @@ def with_srdf(robot: Robot, given: str | Path | None, file: Path | None, name: s
         reason = error.findings[0].as_json()  # reading alone is strict
         semantics = Semantics(notes=(Finding("srdf_unused", {"reason": reason}, {"srdf": Path(path).name}),))
     notes = (*robot.notes, *semantics.notes)
+    own = robot.semantics
+    semantics = replace(
+        semantics,
+        postures=NamedPostures({**own.postures, **semantics.postures}),
+        disabled=own.disabled + semantics.disabled,
+        start=own.start,
+    )
     return replace(robot, **robot.shapes._asdict(), semantics=semantics, notes=notes)
+
+
+def with_states(robot: Robot, states: Srdf | None, start: Mapping[str, float]) -> Robot:
+    """The robot with the postures and the start that its own file names, as an SRDF would."""
+    semantics = Semantics() if states is None else _fitted(states, robot, strict=False)
+    moved = next((note.values for note in robot.notes if note.code == "reference_moved"), None)
+    start = {name: value for name, value in start.items() if name in robot.q_names}
+    if moved is not None and "theta" in start:
+        start |= _at_reference(start, *moved["at"][:2], moved["yaw"])
+    postures = {
+        name: values | (_at_reference(values, *moved["at"][:2], moved["yaw"]) if moved and "x" in values else {})
+        for name, values in semantics.postures.items()
+    }
+    # The file is the robot's own, no SRDF: notes are on it, too.
+    notes = tuple(replace(note, where={}) for note in semantics.notes)
+    semantics = replace(semantics, postures=NamedPostures(postures), files=(), notes=(), start=start)
+    return replace(robot, **robot.shapes._asdict(), semantics=semantics, notes=(*robot.notes, *notes))
+
+
+def _at_reference(root: Mapping[str, float], x: float, y: float, yaw: float) -> dict[str, float]:
+    """Where the reference point is, with its own yaw, when the root link is there."""
+    cosine, sine = np.cos(root["theta"]), np.sin(root["theta"])
+    return {
+        "x": root["x"] + float(cosine * x - sine * y),
+        "y": root["y"] + float(sine * x + cosine * y),
+        "theta": root["theta"] + yaw,
+    }
 
 
 def _fitted(srdf: Srdf, robot: Robot, *, strict: bool) -> Semantics:

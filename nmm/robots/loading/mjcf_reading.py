@@ -1,0 +1,379 @@
+"""An MJCF file as one tree of bodies: includes, default classes, frames, replicas and attached models."""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import NamedTuple, cast
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+
+from nmm.findings import Finding
+from nmm.findings.robot_file import refusal
+from nmm.robots.loading.budget import MOST_LINKS
+from nmm.robots.loading.mjcf_numbers import ORIGIN, ROTATIONS, Numbers, onto, unit
+from nmm.robots.loading.mjcf_tree import Body, Geom, Inertial, Joint, Mesh, Part, Site, moved, names_in, renamed
+from nmm.robots.loading.xml_tree import DEEPEST, Attributes, Element, XmlError, children, parse, read_text
+
+#: What is asked of <compiler>: what stands without it, and what is understood.
+_SETTINGS = {
+    "angle": ("degree", "degree|radian"),
+    "eulerseq": ("xyz", "[xyzXYZ]{3}"),
+    "autolimits": ("true", "true|false"),
+    "coordinate": ("local", "local"),
+}
+_JOINTS = ("hinge", "slide", "free")
+#: What a body may hold, of which nothing is taken: pictures, and what is no rigid body.
+_LEFT_OUT = ("camera", "light", "plugin", "flexcomp")
+#: What scales a <frame> and all in it.
+_SCALES = ("scale", "scaling", "massscale")
+#: Sections whose elements speak of bodies and joints, and the attributes that name them.
+_SECTIONS = ("equality", "actuator", "contact")
+_NAMES = {
+    **dict.fromkeys(("joint", "joint1", "joint2", "jointinparent"), "joint"),
+    **dict.fromkeys(("body", "body1", "body2"), "body"),
+    **dict.fromkeys(("site", "site1", "site2", "refsite", "cranksite", "slidersite"), "site"),
+    **dict.fromkeys(("geom", "geom1", "geom2"), "geom"),
+}
+#: Actuators of all kinds share a class's defaults for these.
+_OF_ACTUATORS = ("ctrlrange", "ctrllimited", "forcerange", "forcelimited", "gear")
+_ACTUATORS = ("general", "motor", "position", "velocity", "intvelocity", "damper", "cylinder", "muscle", "pid")
+
+#: By tag, the attributes that a class gives.
+_Class = dict[str, dict[str, str]]
+
+
+class Dropped(NamedTuple):
+    """Something of the file that is left out, and where it is said."""
+
+    name: str
+    element: Element | None
+
+
+@dataclass
+class Mjcf:
+    """world : the bodies, and what else is in the world
+    references : elements of <equality>, <actuator> and <contact>, their classes' values written out
+    keys : the keyframes; settings : <compiler>; left_out : what of the file is not in here"""
+
+    name: str
+    settings: dict[str, str]
+    world: Body
+    references: list[Element] = field(default_factory=list)
+    keys: list[Element] = field(default_factory=list)
+    left_out: list[Dropped] = field(default_factory=list)
+
+
+def read_mjcf(root: Element, file: Path, faults: Attributes) -> Mjcf:
+    """What the file of that <mujoco> holds; `RobotError` for files that it includes and that are none."""
+    include(root, file)
+    model = _Model(root, file, PurePosixPath(), faults)
+    world = Element("body")
+    world.extend(part for one in children(root, "worldbody") for part in one)
+    parts = [*model.contents(world, "main")]
+    keys = [key for one in children(root, "keyframe") for key in inside(one)]
+    name = root.get("model") or file.stem
+    body = Body(world, "world", pin.SE3.Identity(), parts)
+    return Mjcf(name, model.settings, body, model.references, keys, model.left_out)
+
+
+def include(root: Element, file: Path) -> None:
+    """Puts what other files hold, each read once as in MuJoCo, in the place of <include>."""
+    _include(root, file.parent, file, {file.absolute()}, 0)
+
+
+def _include(parent: Element, folder: Path, main: Path, seen: set[Path], depth: int) -> None:
+    if depth > DEEPEST:
+        raise refusal(main, Finding("nested_too_deep", {"most": DEEPEST}))
+    parts: list[Element] = []
+    for part in inside(parent):
+        if part.tag != "include":
+            _include(part, folder, main, seen, depth + 1)
+            parts.append(part)
+            continue
+        name = part.get("file", "")
+        # Beside the main file, or else beside the one that includes it.
+        file = next((one for one in (main.parent / name, folder / name) if one.is_file()), main.parent / name)
+        place = {"file": name}
+        if file.absolute() in seen:
+            raise refusal(main, Finding("mjcf_included_twice", {}, place))
+        seen.add(file.absolute())
+        included = _parsed(file, name, main)
+        _include(included, file.parent, main, seen, depth + 1)
+        parts += inside(included)
+    parent[:] = parts
+
+
+def _parsed(file: Path, name: str, main: Path) -> Element:
+    """The root element of a file that the main one calls by that name."""
+    place = {"file": name}
+    try:
+        root = parse(read_text(file))
+    except FileNotFoundError:
+        raise refusal(main, Finding("file_unreadable", {"reason": "no such file"}, place)) from None
+    except XmlError as error:
+        line = {**error.finding.where, **place}
+        raise refusal(main, Finding(error.finding.code, error.finding.values, line)) from None
+    for one in cast("Iterator[Element]", root.iter()):
+        one.file = name
+    return root
+
+
+class _Model:
+    """One <mujoco> element, with its own units, classes and assets."""
+
+    def __init__(self, root: Element, file: Path, folder: PurePosixPath, faults: Attributes) -> None:
+        self._root, self._file, self._folder, self._faults = root, file, folder, faults
+        self.left_out: list[Dropped] = []
+        self.settings = {key: usual for key, (usual, _) in _SETTINGS.items()}
+        for one in children(root, "compiler"):
+            self.settings |= one.attrib
+        for key, (usual, pattern) in _SETTINGS.items():
+            if not re.fullmatch(pattern, self.settings[key]):
+                element = next((one for one in children(root, "compiler") if one.get(key)), None)
+                faults.add(element, "mjcf_unread", what=f"<compiler {key}={self.settings[key]!r}>")
+                self.settings[key] = usual
+        self._numbers = Numbers(self.settings, faults)
+        self._classes: dict[str, _Class] = {"main": {}}
+        for one in children(root, "default"):
+            self._read_class(one, "main", {})
+            self._classes[one.get("class", "main")] = self._classes["main"]
+        assets = [part for one in children(root, "asset") for part in inside(one)]
+        self._meshes = {one.get("name", _stem(one)): one for one in assets if one.tag == "mesh"}
+        self._colours = {one.get("name"): one.get("rgba") for one in assets if one.tag == "material"}
+        self._models = {one.get("name", _stem(one)): one for one in assets if one.tag == "model"}
+        self.references = [
+            self._with_defaults(one, "main", section)
+            for section in _SECTIONS
+            for parent in children(root, section)
+            for one in inside(parent)
+        ]
+
+    def _read_class(self, element: Element, name: str, above: _Class) -> None:
+        """A <default>: what the one around it says, and what the elements in it change."""
+        made = {tag: {**values} for tag, values in self._classes.get(name, above).items()}
+        for part in inside(element):
+            if part.tag == "default":
+                continue
+            _override(made.setdefault(part.tag, {}), part.attrib)
+            if part.tag in _ACTUATORS:
+                shared = {key: value for key, value in part.attrib.items() if key in _OF_ACTUATORS}
+                made.setdefault("actuator", {}).update(shared)
+        self._classes[name] = made
+        for nested in children(element, "default"):
+            self._read_class(nested, nested.get("class", name), made)
+
+    def _with_defaults(self, element: Element, childclass: str, section: str = "") -> Element:
+        """The element with what its class gives; the class's own tag is the section's in <equality> and
+        <actuator>."""
+        name = element.get("class", childclass)
+        self._faults.choice(element, name, [*self._classes], "default class", {})
+        given = self._classes.get(name, {})
+        values = {**given.get(section or element.tag, {})}
+        _override(values, element.attrib)
+        made = Element(element.tag, {key: value.strip() for key, value in values.items()})
+        made.extend(element)
+        made.line, made.file = element.line, element.file
+        return made
+
+    def contents(self, parent: Element, childclass: str) -> Iterator[Part]:
+        """What a body, a frame or a replica holds, in the axes of that."""
+        childclass = parent.get("childclass", childclass)
+        for element in inside(parent):
+            match element.tag:
+                case "frame":
+                    yield from self._frame(element, childclass)
+                case "replicate":
+                    yield from self._replicate(element, childclass)
+                case "attach":
+                    yield from self._attach(element)
+                case "body":
+                    own = [*self.contents(element, childclass)]
+                    yield Body(element, element.get("name", ""), self._numbers.place(element), own)
+                case "joint" | "freejoint":
+                    yield self._joint(self._with_defaults(element, childclass))
+                case "geom":
+                    yield from self._geom(self._with_defaults(element, childclass))
+                case "site":
+                    yield self._site(self._with_defaults(element, childclass))
+                case "inertial":
+                    yield self._inertial(element)
+                case "flexcomp":
+                    self.left_out.append(Dropped(f"<flexcomp> {element.get('name', '')}".strip(), element))
+                case tag if tag not in _LEFT_OUT:
+                    self._faults.add(element, "mjcf_unread", what=f"<{tag}>")
+
+    def _frame(self, frame: Element, childclass: str) -> Iterator[Part]:
+        for key in _SCALES:
+            if frame.get(key) is not None:
+                self._faults.add(frame, "mjcf_unread", what=f"<frame {key}>")
+        place = self._numbers.place(frame)
+        yield from (moved(part, place) for part in self.contents(frame, childclass))
+
+    def _replicate(self, element: Element, childclass: str) -> Iterator[Part]:
+        """Each replica stands in the axes of the one before it, moved and turned on; names get its number."""
+        count = int(self._numbers.number(element, "count", 1.0))
+        parts = [*self.contents(element, childclass)]
+        if not 0 <= count * max(len(names_in(parts)), 1) <= MOST_LINKS:
+            self._faults.add(element, "beyond_bound", what="links", most=MOST_LINKS)
+            return
+        step = pin.SE3(self._numbers.rotation(element), self._numbers.vector(element, "offset", ORIGIN))
+        digits = len(str(count - 1))
+        ends = [f"{element.get('sep', '')}{number:0{digits}d}" for number in range(count)]
+        self._follow(names_in(parts), ends)
+        place = pin.SE3.Identity()
+        for end in ends:
+            for part in parts:
+                yield moved(renamed(part, lambda _, name, end=end: name + end), place)  # type: ignore[misc]
+            place = place * step
+
+    def _follow(self, names: set[tuple[str, str]], ends: Sequence[str]) -> None:
+        """What speaks of replicas alone is said of each, as in MuJoCo; what also speaks of others of none."""
+        made: list[Element] = []
+        for element in self.references:
+            spoken = {key: (_NAMES[key], name) for key, name in element.attrib.items() if key in _NAMES}
+            replicas = {key: name for key, (kind, name) in spoken.items() if (kind, name) in names}
+            if not replicas:
+                made.append(element)
+            elif len(replicas) < len(spoken):
+                self.left_out.append(Dropped(f"<{element.tag}> {element.get('name', '')}".strip(), element))
+            else:
+                made += [_renamed(element, {key: name + end for key, name in replicas.items()}) for end in ends]
+        self.references = made
+
+    def _attach(self, element: Element) -> Iterator[Part]:
+        """The body, the frame or all of another file's model, its names behind a prefix."""
+        name, prefix = element.get("model", ""), element.get("prefix", "")
+        self._faults.choice(element, name, [*self._models], "model", {"part": "<attach>"})
+        asset = self._models.get(name)
+        if asset is None:
+            return
+        file = self._file.parent / asset.get("file", "")
+        inner = _parsed(file, asset.get("file", ""), self._file)
+        include(inner, file)
+        folder = self._folder / PurePosixPath(asset.get("file", "")).parent
+        other = _Model(inner, file, folder, self._faults)
+        world = Element("body")
+        world.extend(part for one in children(inner, "worldbody") for part in one)
+        wanted = [(key, value) for key in ("body", "frame") if (value := element.get(key))]
+        for key, value in wanted:
+            found = [one for one in inside(world, deep=True) if one.tag == key and one.get("name") == value]
+            self._faults.choice(element, value, [value] if found else [], key, {"part": "<attach>"})
+            world[:] = found[:1]
+        parts = [renamed(part, lambda _, name: prefix + name) for part in other.contents(world, "main")]
+        names = names_in(parts)
+        for one in other.references:
+            spoken = {key: prefix + value for key, value in one.attrib.items() if key in _NAMES}
+            if spoken and all((_NAMES[key], value) in names for key, value in spoken.items()):
+                self.references.append(_renamed(one, spoken))
+        for key in (key for one in children(inner, "keyframe") for key in inside(one)):
+            self.left_out.append(Dropped(f"keyframe {key.get('name', '')} of {name}", key))
+        self.left_out += other.left_out
+        yield from parts
+
+    def _joint(self, joint: Element) -> Joint:
+        kind = "free" if joint.tag == "freejoint" else joint.get("type", "hinge")
+        name = joint.get("name", "")
+        self._faults.choice(joint, kind, _JOINTS, "joint type", {"joint": name or None})
+        read, scale = self._numbers, self._numbers.degree if kind == "hinge" else 1.0
+        lower, upper = map(float, scale * read.vector(joint, "range", (0.0, 0.0)))
+        limits = (lower, upper) if self._holds(joint, "limited", lower, upper) else None
+        least, most = map(float, read.vector(joint, "actuatorfrcrange", (0.0, 0.0)))
+        bounded = self._holds(joint, "actuatorfrclimited", least, most)
+        return Joint(
+            joint,
+            name,
+            kind,
+            read.vector(joint, "pos", ORIGIN),
+            unit(read.vector(joint, "axis", (0.0, 0.0, 1.0))),
+            scale * read.number(joint, "ref"),
+            limits,
+            min(abs(least), abs(most)) if bounded else None,
+            read.number(joint, "armature"),
+        )
+
+    def _holds(self, element: Element, attribute: str, lower: float, upper: float) -> bool:
+        """Whether a range holds: by that attribute or, as MuJoCo has it, because it is there."""
+        word = element.get(attribute, "auto")
+        return (self.settings["autolimits"] == "true" and lower < upper) if word == "auto" else word == "true"
+
+    def _geom(self, geom: Element) -> Iterator[Geom]:
+        read, name = self._numbers, geom.get("mesh", "")
+        kind = geom.get("type", "sphere")
+        mesh = self._mesh(name) if name in self._meshes else None
+        if name and mesh is None:
+            self._faults.choice(geom, name, [*self._meshes], "mesh", {"part": "<geom>"})
+        geom.set("size", " ".join([*geom.get("size", "").split(), "0", "0", "0"][:3]))
+        size, place = read.vector(geom, "size", ORIGIN), read.place(geom)
+        if geom.get("fromto"):
+            start, end = read.vector(geom, "fromto", (*ORIGIN, *ORIGIN)).reshape(2, 3)
+            size[1:] = size[0], 0.0
+            size[2 if kind in ("box", "ellipsoid") else 1] = 0.5 * np.linalg.norm(end - start)
+            place = pin.SE3(onto(end - start), 0.5 * (start + end))
+        yield Geom(
+            geom,
+            geom.get("name", ""),
+            kind,
+            place,
+            size,
+            mesh,
+            read.number(geom, "mass") if geom.get("mass") is not None else None,
+            read.number(geom, "density", 1000.0),
+            geom.get("shellinertia") == "true",
+            int(read.number(geom, "group")),
+            geom.get("contype", "1") != "0" or geom.get("conaffinity", "1") != "0",
+            geom.get("rgba") or self._colours.get(geom.get("material")),
+        )
+
+    def _mesh(self, name: str) -> Mesh:
+        mesh = self._with_defaults(self._meshes[name], "main")
+        file = mesh.get("file", "")
+        if file:
+            folder = self.settings.get("meshdir", self.settings.get("assetdir", ""))
+            bare = PurePosixPath(file).name if self.settings.get("strippath") == "true" else file
+            file = str(self._folder / folder / bare)
+        reference = pin.SE3(
+            self._numbers.rotation(mesh, "refquat"), self._numbers.vector(mesh, "refpos", ORIGIN)
+        )
+        scale = self._numbers.vector(mesh, "scale", (1.0, 1.0, 1.0))
+        return Mesh(mesh, name, file, scale, reference, mesh.get("inertia", "legacy"))
+
+    def _site(self, site: Element) -> Site:
+        place = self._numbers.place(site)
+        if site.get("fromto"):
+            start, end = self._numbers.vector(site, "fromto", (*ORIGIN, *ORIGIN)).reshape(2, 3)
+            place = pin.SE3(onto(end - start), 0.5 * (start + end))
+        return Site(site, site.get("name", ""), place)
+
+    def _inertial(self, inertial: Element) -> Inertial:
+        read = self._numbers
+        principal = read.vector(inertial, "diaginertia", ORIGIN)
+        xx, yy, zz, xy, xz, yz = read.vector(inertial, "fullinertia", (*principal, *ORIGIN))
+        moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        return Inertial(inertial, read.place(inertial), read.number(inertial, "mass"), moments)
+
+
+def _override(values: dict[str, str], attributes: dict[str, str]) -> None:
+    """Attributes over those of a class: a rotation replaces one that is said otherwise."""
+    if any(key in attributes for key in ROTATIONS):
+        for key in ROTATIONS:
+            values.pop(key, None)
+    values.update(attributes)
+
+
+def _renamed(element: Element, names: dict[str, str]) -> Element:
+    made = Element(element.tag, {**element.attrib, **names})
+    made.extend(element)
+    made.line, made.file = element.line, element.file
+    return made
+
+
+def inside(element: ElementTree.Element, deep: bool = False) -> list[Element]:
+    """The elements in one; `deep`: also those in these."""
+    return cast("list[Element]", [*element.iter()][1:] if deep else [*element])
+
+
+def _stem(asset: Element) -> str:
+    return PurePosixPath(asset.get("file", "")).stem
