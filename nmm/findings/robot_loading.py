@@ -119,6 +119,10 @@ WORDS = placed(
         "collision_pairs": "{count} collision pairs: none within a body or across one joint",
         "shapes_left_out": _names("shapes left out, their meshes are missing: {names}"),
         "base_of_joints": _base_of_joints,
+        "gantry": _names(
+            "{names} slide all else and nothing turns it: a gantry, which stands on platform fixed; --platform "
+            'NAME (platform="NAME") puts it on another'
+        ),
         "arm_mounted": lambda *, name, key, frame, base, prefix, **_: (
             f"{name} mounted{f' as {key}' if key != name else ''} at {frame} of {base}"
             f"{f', its names with the prefix {prefix}' if prefix else ''}"

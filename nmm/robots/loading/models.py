@@ -25,7 +25,7 @@ from nmm.robots.loading.measured_joints import (
 )
 from nmm.robots.loading.provenance import Parts
 from nmm.robots.loading.source import Source
-from nmm.robots.loading.virtual_base import VirtualBase, find_virtual_base
+from nmm.robots.loading.virtual_base import VirtualBase, find_virtual_base, gantry
 from nmm.robots.robot import Robot
 from nmm.robots.wheel import Wheel
 
@@ -53,9 +53,13 @@ def robot_from(source: Source, options: Options) -> Robot:
     rebuilt.model.name = options.name or source.name
     stated = options.platform.coordinates[len(CHAIN) :] if isinstance(options.platform, Platform) else ()
     made = with_locked(rebuilt, options.lock, source.mimic_joints, where, stated)
-    base = find_virtual_base(made.rebuilt.model, where)
+    base, slides = find_virtual_base(made.rebuilt.model, where), gantry(made.rebuilt.model, where)
+    stands = bool(slides) and options.platform is None and source.platform is None
+    if stands:
+        options, is_fixed, base = replace(options, platform=FixedBase()), True, None
     if base is not None and not is_fixed:
         made = _standing(made, base.joints, where)
+        made = replace(made, rebuilt=_about(made.rebuilt, base.place, where))
     rebuilt = made.rebuilt
     if options.axle is not None:
         placement = _axle_placement(rebuilt.model, options.axle, where)
@@ -71,6 +75,9 @@ def robot_from(source: Source, options: Options) -> Robot:
     made = _turned_up(replace(made, rebuilt=rebuilt), platform, where)
     rebuilt = made.rebuilt
     remarks = [*contradictions]
+    if stands:
+        origin = "base"
+        remarks.append(Finding("gantry", {"names": [*slides]}))
     if base is not None:
         platform = base.limited(platform)
         remarks.append(base.note(platform))
@@ -78,7 +85,7 @@ def robot_from(source: Source, options: Options) -> Robot:
     if added is not None:
         rebuilt = _with_joint(rebuilt, added, where)
     own = _own_joints(platform, rebuilt.model, made.values, where)
-    made = replace(made, rebuilt=_on_platform(rebuilt, platform, own, where))
+    made = replace(made, rebuilt=_on_platform(rebuilt, platform, own, source, where))
     if not platform.coordinates:
         made = _with_held_wheels(made, options.wheels, where)
     provenance = replace(
@@ -216,10 +223,24 @@ def _own_joints(
     return own
 
 
-def _on_platform(rebuilt: Rebuilt, platform: Platform, own: Sequence[str], where: str) -> Rebuilt:
+def _about(rebuilt: Rebuilt, place: pin.SE3, where: str) -> Rebuilt:
+    """The model whose x, y and theta count from a place in its root link, and nothing else changes."""
+    model = rebuilt.model.copy()
+    model.jointPlacements[1] = model.jointPlacements[1] * place
+    moved = rebuild(model, rebuilt.geometries, where, root=place.inverse())
+    return replace(moved, notes=rebuilt.notes)
+
+
+def _on_platform(
+    rebuilt: Rebuilt, platform: Platform, own: Sequence[str], source: Source, where: str
+) -> Rebuilt:
     model = rebuilt.model
     if not platform.coordinates:
-        made = rebuild(model, rebuilt.geometries, where, root=model.jointPlacements[1], head=())
+        start = {} if source.mjcf is None else source.mjcf.start
+        x, y, yaw = (start.get(name, 0.0) for name in CHAIN)
+        stands = pin.SE3(pin.utils.rotate("z", yaw), np.array([x, y, 0.0]))
+        root = stands * model.jointPlacements[1]
+        made = rebuild(model, rebuilt.geometries, where, root=root, head=())
     else:
         made = rebuild(model, rebuilt.geometries, where, first=own) if own else rebuilt
     return replace(made, notes=rebuilt.notes)
