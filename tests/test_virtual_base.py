@@ -34,7 +34,6 @@ def based(*joints: tuple[str, str], end: float = 999999.0, offset: str = "0 0 0"
         ((TURN, AHEAD), "unicycle"),
         ((TURN, AHEAD, TURN), "omnidirectional"),
         ((AHEAD, ASIDE, TURN), "omnidirectional"),
-        ((ASIDE, AHEAD), "omnidirectional"),
     ],
 )
 @pytest.mark.parametrize("end", [1e5, 999999.0, 1e9])

@@ -78,10 +78,10 @@ def _path(names: Sequence[str]) -> str:
     return " -> ".join(shown)
 
 
-def _lined(names: Sequence[str], lines: Mapping[str, int | None] | None) -> str:
-    """Names with their lines."""
-    at = {name: line for name, line in (lines or {}).items() if line}
-    return few([f"{name} (line {at[name]})" if name in at else name for name in names])
+def _lined(names: Sequence[str], lines: Mapping[str, int | str]) -> str:
+    """Names with their lines, or FILE:LINE."""
+    at = {name: f"line {line}" if isinstance(line, int) else line for name, line in lines.items()}
+    return few([f"{name} ({at[name]})" if name in at else name for name in names])
 
 
 def _values(values: Mapping[str, float]) -> str:
@@ -113,8 +113,8 @@ WORDS = placed(
                 else ""
             )
         ),
-        "mjcf_left_out": lambda *, names, lines=None, **_: (
-            f"left out of the MJCF file: {_lined(names, lines)}"
+        "mjcf_left_out": lambda *, names, lines=(), **_: (
+            f"left out of the MJCF file: {_lined(names, dict(lines))}"
         ),
         "mjcf_noted": lambda *, why, names, lines, **_: f"MJCF: {_lined(names, lines)}: {why}",
         "mjcf_keyframe": "keyframe {name!r} has {got} numbers as qpos, the robot has {size}: left out",

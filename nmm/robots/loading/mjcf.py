@@ -16,7 +16,7 @@ from nmm.robots.loading.check_parts import MESH_SUFFIXES, MOMENTS
 from nmm.robots.loading.mending import NO_LIMIT
 from nmm.robots.loading.mjcf_masses import Masses, fitted
 from nmm.robots.loading.mjcf_numbers import at, turn
-from nmm.robots.loading.mjcf_parts import unused
+from nmm.robots.loading.mjcf_parts import line_in, unused
 from nmm.robots.loading.mjcf_reading import Dropped, Mjcf, read_mjcf
 from nmm.robots.loading.mjcf_states import Drives, drives_of, states_of
 from nmm.robots.loading.mjcf_tree import Body, Geom, Joint, Mesh, Site
@@ -63,14 +63,13 @@ def urdf_of(root: Element, file: Path) -> Converted:
 
 def _left_out(dropped: Iterable[Dropped]) -> list[Finding]:
     """What is left out, in a note with lines; each name once."""
-    first: dict[str, Element | None] = {}
+    first: dict[str, Element] = {}
     for one in dropped:
         first.setdefault(one.name, one.element)
     if not first:
         return []
-    places = [{} if element is None else element.place for element in first.values()]
-    lines = {name: place.get("line") for name, place in zip(first, places, strict=True)}
-    return [Finding("mjcf_left_out", {"names": [*first], "lines": lines}, places[0])]
+    lines = {name: line_in(element) for name, element in first.items()}
+    return [Finding("mjcf_left_out", {"names": [*first], "lines": lines}, next(iter(first.values())).place)]
 
 
 class _Writer:
@@ -211,17 +210,17 @@ class _Writer:
             self.start[name] = ref
 
     def _couple(self, equality: Element) -> None:
-        """A joint that follows another in a straight line; other constraints are left out."""
-        if equality.tag not in ("connect", "weld", "joint", "tendon", "flex", "flexvert", "flexstrain"):
+        """A joint that follows another in a straight line; one held otherwise, or still, is left out."""
+        if equality.tag != "joint":
             return
         reader = Attributes()
         bends = reader.vector(equality, "polycoef", 5, {}) or [0.0, 1.0, 0.0, 0.0, 0.0]
         self.faults.found += reader.found
         names = [equality.get("joint1", ""), equality.get("joint2", "")]
-        if equality.get("active") == "false" or (equality.tag == "joint" and names[0] not in self._written):
+        if equality.get("active") == "false" or names[0] not in self._written:
             return
-        if "joint1" not in equality.attrib or names[1] not in self._written or any(bends[2:]):
-            name = f"<{equality.tag}> {equality.get('name') or names[0]}".strip()
+        if names[1] not in self._written or any(bends[2:]):
+            name = f"<equality> of joint {names[0]}"
             self.left_out.append(Dropped(name, equality))
             return
         (follower, ref), (_, of_leader) = (self._written[name] for name in names)

@@ -82,7 +82,7 @@ class Masses:
                 continue
             solid = self.solid(geom)
             if solid is None:
-                self.unknown.append(Dropped(f"geom of mesh {geom.mesh.name if geom.mesh else ''}", geom.element))
+                self.unknown.append(Dropped(f"mass of mesh {geom.mesh.name if geom.mesh else ''}", geom.element))
                 continue
             mass = geom.density * solid.volume if geom.mass is None else geom.mass
             if mass > 0.0:
@@ -223,8 +223,8 @@ def _hull(vertices: Array) -> tuple[Array, np.ndarray]:
 
 
 def _weighed(vertices: Array, faces: np.ndarray, how: str) -> Solid:
-    """By the tetrahedra from the surface's centroid to each face: "legacy", their volumes all count as
-    positive; "exact", as signed; "convex", those of the hull; "shell", the faces alone."""
+    """By the tetrahedra from the surface's centroid to each face: "exact"; "convex", of the hull; "shell", by
+    the faces alone; "legacy", where their volumes all count as positive, once more from the centre of mass."""
     if how == "convex":
         vertices, faces = _hull(vertices)
     corners = vertices[faces]
@@ -234,11 +234,24 @@ def _weighed(vertices: Array, faces: np.ndarray, how: str) -> Solid:
     centroid = areas @ corners.mean(axis=1) / total
     if how == "shell":
         return _summed(areas, corners - centroid, centroid, 12.0)
-    volumes = np.einsum("ij,ij->i", corners[:, 0] - centroid, crossed) / 6.0
-    if how == "legacy":
-        volumes = np.abs(volumes)
-    apex = np.zeros((len(corners), 1, 3))
-    return _summed(volumes, np.concatenate([corners - centroid, apex], axis=1), centroid, 20.0)
+    solid = _of_tetrahedra(corners, crossed, centroid, how == "legacy")
+    if how != "legacy":
+        return solid
+    again = _of_tetrahedra(corners, crossed, solid.center, True)
+    off = again.center - solid.center  # the moments stay those about the first centre
+    moments = again.moments + (off @ off * np.eye(3) - np.outer(off, off))
+    return Solid(again.volume, solid.center, moments)
+
+
+def _of_tetrahedra(corners: Array, crossed: Array, apex: Array, positive: bool) -> Solid:
+    volumes = np.einsum("ij,ij->i", corners[:, 0] - apex, crossed) / 6.0
+    tips = np.zeros((len(corners), 1, 3))
+    return _summed(
+        np.abs(volumes) if positive else volumes,
+        np.concatenate([corners - apex, tips], axis=1),
+        apex,
+        20.0,
+    )
 
 
 def _summed(weights: Array, corners: Array, origin: Array, share: float) -> Solid:

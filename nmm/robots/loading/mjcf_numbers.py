@@ -38,12 +38,7 @@ class Numbers:
             *axis, angle = self.vector(element, "axisangle", (*ORIGIN, 0.0))
             return turn(self.degree * angle, unit(np.array(axis)))
         if element.get("euler"):
-            made = np.eye(3)
-            angles = self.vector(element, "euler", ORIGIN)
-            for letter, angle in zip(self._sequence, angles, strict=True):
-                step = pin.utils.rotate(letter.lower(), float(self.degree * angle))
-                made = made @ step if letter.islower() else step @ made
-            return made
+            return self.turned(self.vector(element, "euler", ORIGIN))
         if element.get("xyaxes"):
             x, y = self.vector(element, "xyaxes", (*ORIGIN, *ORIGIN)).reshape(2, 3)
             x = unit(x)
@@ -52,6 +47,14 @@ class Numbers:
         if element.get("zaxis"):
             return onto(self.vector(element, "zaxis", ORIGIN))
         return matrix(self.vector(element, quaternion, (1.0, *ORIGIN)))
+
+    def turned(self, angles: Array) -> Array:
+        """The matrix of angles in the file's unit and sequence."""
+        made = np.eye(3)
+        for letter, angle in zip(self._sequence, angles, strict=True):
+            step = pin.utils.rotate(letter.lower(), float(self.degree * angle))
+            made = made @ step if letter.islower() else step @ made
+        return made
 
 
 def matrix(quaternion: Array) -> Array:

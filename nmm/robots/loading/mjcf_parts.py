@@ -45,7 +45,7 @@ _OTHER_ACTUATOR = Row("noted", "limits are those of motors, position and velocit
 _ON_JOINT = (
     "joint gear ctrlrange ctrllimited forcerange forcelimited",
     "tendon site body jointinparent slidersite",
-    "kp kv dampratio timeconst inheritrange lengthrange cranksite cranklength refsite armature",
+    "group kp kv dampratio timeconst inheritrange lengthrange cranksite cranklength refsite armature",
 )
 
 #: Attributes that mean the same in every element: those with a name, a class and a place, and what is of
@@ -188,9 +188,14 @@ def unused(root: Element) -> Iterator[Finding]:
     for why, name, element in _walk(root, ""):
         by_reason.setdefault(why, {}).setdefault(name, element)
     for why, first in by_reason.items():
-        lines = {name: element.line for name, element in first.items()}
+        lines = {name: line_in(element) for name, element in first.items()}
         where = next(iter(first.values())).place
         yield Finding("mjcf_noted", {"why": why, "names": [*first], "lines": lines}, where)
+
+
+def line_in(element: Element) -> int | str:
+    """The line in the file itself, or FILE:LINE of one that it includes."""
+    return f"{element.file}:{element.line}" if element.file else element.line
 
 
 def _walk(element: Element, path: str) -> Iterator[tuple[str, str, Element]]:
@@ -204,8 +209,10 @@ def _walk(element: Element, path: str) -> Iterator[tuple[str, str, Element]]:
         yield "not known to this version", tag, element
         return
     row = found[1]
-    if row.how == "noted" and not of_class:
-        yield row.why, tag, element
+    if row.how == "noted":
+        if not of_class:
+            yield row.why, tag, element
+        return
     for attribute, value in element.attrib.items():
         how = how_of(row, attribute)
         if how is None:

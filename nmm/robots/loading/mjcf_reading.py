@@ -13,7 +13,7 @@ import pinocchio as pin
 from nmm.findings import Finding
 from nmm.findings.robot_file import refusal
 from nmm.robots.loading.budget import MOST_LINKS
-from nmm.robots.loading.mjcf_numbers import ORIGIN, ROTATIONS, Numbers, onto, unit
+from nmm.robots.loading.mjcf_numbers import ORIGIN, ROTATIONS, Numbers, at, onto, unit
 from nmm.robots.loading.mjcf_tree import Body, Geom, Inertial, Joint, Mesh, Part, Site, moved, names_in, renamed
 from nmm.robots.loading.xml_tree import DEEPEST, Attributes, Element, XmlError, children, parse, read_text
 
@@ -49,7 +49,7 @@ class Dropped(NamedTuple):
     """Something of the file that is left out, and where it is said."""
 
     name: str
-    element: Element | None
+    element: Element
 
 
 @dataclass
@@ -200,8 +200,6 @@ class _Model:
                     yield self._site(self._with_defaults(element, childclass))
                 case "inertial":
                     yield self._inertial(element)
-                case "flexcomp":
-                    self.left_out.append(Dropped(f"<flexcomp> {element.get('name', '')}".strip(), element))
                 case tag if tag not in _LEFT_OUT:
                     self._faults.add(element, "mjcf_unread", what=f"<{tag}>")
 
@@ -213,21 +211,23 @@ class _Model:
         yield from (moved(part, place) for part in self.contents(frame, childclass))
 
     def _replicate(self, element: Element, childclass: str) -> Iterator[Part]:
-        """Each replica stands in the axes of the one before it, moved and turned on; names get its number."""
+        """Each replica is moved on in the axes of the one before it, and turned by so often the angles; names
+        get its number."""
         count = int(self._numbers.number(element, "count", 1.0))
         parts = [*self.contents(element, childclass)]
         if not 0 <= count * max(len(names_in(parts)), 1) <= MOST_LINKS:
             self._faults.add(element, "beyond_bound", what="links", most=MOST_LINKS)
             return
-        step = pin.SE3(self._numbers.rotation(element), self._numbers.vector(element, "offset", ORIGIN))
+        offset, angles = (self._numbers.vector(element, key, ORIGIN) for key in ("offset", "euler"))
         digits = len(str(count - 1))
         ends = [f"{element.get('sep', '')}{number:0{digits}d}" for number in range(count)]
         self._follow(names_in(parts), ends)
         place = pin.SE3.Identity()
-        for end in ends:
+        for number, end in enumerate(ends):
+            place.rotation = self._numbers.turned(number * angles)
             for part in parts:
                 yield moved(renamed(part, lambda _, name, end=end: name + end), place)  # type: ignore[misc]
-            place = place * step
+            place = place * at(offset)
 
     def _follow(self, names: set[tuple[str, str]], ends: Sequence[str]) -> None:
         """What speaks of replicas alone is said of each, as in MuJoCo; what also speaks of others of none."""
