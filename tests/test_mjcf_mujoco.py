@@ -12,7 +12,7 @@ from findings import assert_found, holds, of_code, refused_for
 from urdf_parts import write
 
 import nmm
-from nmm.robots.loading.mjcf_parts import ELEMENTS, how_of, row_of
+from nmm.robots.loading.mjcf_parts import ELEMENTS, _of_class, how_of, row_of
 from nmm.robots.loading.report import file_report
 
 mujoco: Any = pytest.importorskip("mujoco")
@@ -102,7 +102,9 @@ def weighs(robot: nmm.Robot, own: pin.Data, joint: str, model: Any, data: Any, i
     np.testing.assert_allclose(ours.inertia, moments, atol=1e-5 * np.abs(moments).max())
 
 
-LINK = '<body name="{0}" pos="0.1 0.2 0.3"><joint name="{0}_j" axis="1 2 0" pos="0.1 0 0" ref="20"/>{1}</body>'
+LINK = (
+    '<body name="{0}" pos="0.1 0.2 0.3"><joint name="{0}_j" axis="1 2 0" pos="0.1 0 0" ref="20"/>{1}</body>'
+)
 BALL = '<geom size="0.1"/>'
 
 
@@ -111,9 +113,9 @@ BALL = '<geom size="0.1"/>'
     [
         world(
             '<frame pos="1 0 0" euler="0 30 0" childclass="long"><body name="a"><joint name="j"/>'
-            '<frame pos="0 1 0" axisangle="1 0 0 40"><frame zaxis="1 1 1"><geom/><joint name="k" type="slide"/>'
-            '<site name="tip" pos="0 0 1"/><body name="b"><joint name="m" class="short"/><geom class="short"/>'
-            "</body></frame></frame></body></frame>",
+            '<frame pos="0 1 0" axisangle="1 0 0 40"><frame zaxis="1 1 1"><geom/>'
+            '<joint name="k" type="slide"/><site name="tip" pos="0 0 1"/><body name="b">'
+            '<joint name="m" class="short"/><geom class="short"/></body></frame></frame></body></frame>',
             before='<default><default class="long"><geom type="capsule" size="0.1 0.5" euler="0 90 0"/>'
             '<joint axis="0 1 0" range="-90 30"/><default class="short"><geom quat="1 1 0 0" size="0.1 0.2"/>'
             "</default></default></default>",
@@ -129,15 +131,18 @@ BALL = '<geom size="0.1"/>'
         world(
             LINK.format(
                 "a",
-                BALL + '<replicate count="2" offset="1 0 0" sep="-"><replicate count="2" offset="0 1 0" sep="_">'
+                BALL
+                + '<replicate count="2" offset="1 0 0" sep="-"><replicate count="2" offset="0 1 0" sep="_">'
                 f"{LINK.format('b', BALL)}</replicate></replicate>",
             )
         ),
         world(
-            '<body name="a"><joint name="j" armature="0.2"/><geom type="cylinder" fromto="0 0 0 1 0.5 0" size="0.1"/>'
-            '<body name="b" xyaxes="0 1 0 -1 0 0"><joint name="k" type="slide" axis="0 1 1" ref="0.3" range="-1 1"/>'
+            '<body name="a"><joint name="j" armature="0.2"/>'
+            '<geom type="cylinder" fromto="0 0 0 1 0.5 0" size="0.1"/><body name="b" xyaxes="0 1 0 -1 0 0">'
+            '<joint name="k" type="slide" axis="0 1 1" ref="0.3" range="-1 1"/>'
             '<inertial pos="0.1 0 0" mass="2" fullinertia="0.2 0.3 0.4 0.01 0.02 0.03"/></body></body>',
-            before='<compiler eulerseq="ZYX" autolimits="false"/><default><joint limited="true" range="-9 8"/></default>',
+            before='<compiler eulerseq="ZYX" autolimits="false"/>'
+            '<default><joint limited="true" range="-9 8"/></default>',
         ),
     ],
     ids=["frames", "replicas", "replicas of replicas", "compiler"],
@@ -171,7 +176,13 @@ def test_a_model_is_attached_with_its_own_units(tmp_path: Path, rng: np.random.G
 
 
 def test_masses_of_shapes_are_mujocos(tmp_path: Path, rng: np.random.Generator) -> None:
-    sizes = {"sphere": "0.3", "capsule": "0.1 0.4", "cylinder": "0.1 0.4", "ellipsoid": ".1 .2 .3", "box": ".1 .2 .3"}
+    sizes = {
+        "sphere": "0.3",
+        "capsule": "0.1 0.4",
+        "cylinder": "0.1 0.4",
+        "ellipsoid": ".1 .2 .3",
+        "box": ".1 .2 .3",
+    }
     for said in ("", 'mass="2"', 'density="300"', 'shellinertia="true"', 'mass="2" shellinertia="true"'):
         bodies = "".join(
             f'<body name="{kind}"><joint name="j_{kind}"/>'
@@ -199,14 +210,22 @@ def test_masses_of_meshes_are_mujocos(
     geoms = {
         "m": 'type="mesh" pos="1 2 3" euler="10 20 30"',
         "n": 'type="mesh" mass="3"',
-        **{kind: f'type="{kind}" fitscale="1.1"' for kind in ("box", "sphere", "capsule", "cylinder", "ellipsoid")},
+        **{
+            kind: f'type="{kind}" fitscale="1.1"'
+            for kind in ("box", "sphere", "capsule", "cylinder", "ellipsoid")
+        },
         "plain": "",
     }
-    bodies = "".join(f'<body name="{one}"><joint name="j_{one}"/><geom mesh="m" {said}/></body>' for one, said in geoms.items())
+    bodies = "".join(
+        f'<body name="{one}"><joint name="j_{one}"/><geom mesh="m" {said}/></body>'
+        for one, said in geoms.items()
+    )
     assets = (
         f'<asset><mesh name="m" file="m.{suffix}" scale="0.1 -0.2 0.3" refpos="0.3 0.2 0.1" {how}/></asset>'
     )
-    path = write(tmp_path / "r.xml", world(f'<body name="a"><joint name="j"/>{BALL}{bodies}</body>', before=assets))
+    path = write(
+        tmp_path / "r.xml", world(f'<body name="a"><joint name="j"/>{BALL}{bodies}</body>', before=assets)
+    )
     robot = agrees(path, rng)
     model = mujoco.MjModel.from_xml_path(str(path))
     # Where they collide: what plain shapes are fitted to, MuJoCo has made.
@@ -249,10 +268,10 @@ def test_the_compilers_settings_of_masses_hold(
 def test_a_free_body_is_where_its_qpos_says(
     tmp_path: Path, rng: np.random.Generator, place: str, around: str
 ) -> None:
-    """x, y and theta are those of MuJoCo's qpos; it starts, and on a fixed base stands, where the file has it."""
+    """x, y and theta are those of MuJoCo's qpos; it starts, and on a fixed base is, where the file has it."""
     body = f'<body name="base" {place}><freejoint/><geom type="box" size=".2 .2 .05"/>{WHEELS}'
     text = world(
-        f'{around}{body}{LINK.format("arm", BALL)}</body>{"</frame>" if around else ""}',
+        f"{around}{body}{LINK.format('arm', BALL)}</body>{'</frame>' if around else ''}",
         after='<keyframe><key name="home" qpos="1 2 0.1 0.8 0 0 0.6 0 0 0.4"/></keyframe>',
     )
     path = write(tmp_path / "r.xml", text)
@@ -269,7 +288,8 @@ def test_a_free_body_is_where_its_qpos_says(
 
 
 def test_wheels_touch_the_ground_below_a_free_body(tmp_path: Path) -> None:
-    body = f'<body name="base" pos="1 0.5 0.1" euler="0 0 40"><freejoint/><geom type="box" size=".2 .2 .05"/>{WHEELS}'
+    free = '<body name="base" pos="1 0.5 0.1" euler="0 0 40"><freejoint/>'
+    body = f'{free}<geom type="box" size=".2 .2 .05"/>{WHEELS}'
     path = write(tmp_path / "r.xml", world(f"{body}{LINK.format('arm', BALL)}</body>"))
     report = file_report(path)
     assert report.facts["ground"] == "the wheels touch it at z = 0"
@@ -289,7 +309,8 @@ def test_slides_and_a_turn_stand_where_their_body_does(tmp_path: Path, order: st
         "t": '<joint name="yaw" axis="0 0 1"/>',
     }
     joints = "".join(made[one] for one in order)
-    text = world(f'<body name="base" pos="1 0.5 0.1" euler="0 0 40">{joints}{BALL}{WHEELS}{LINK.format("arm", BALL)}</body>')
+    arm = LINK.format("arm", BALL)
+    text = world(f'<body name="base" pos="1 0.5 0.1" euler="0 0 40">{joints}{BALL}{WHEELS}{arm}</body>')
     path = write(tmp_path / "r.xml", text)
     robot, model = nmm.load(path), mujoco.MjModel.from_xml_path(str(path))
     assert robot.q_names == ("x", "y", "theta", "arm_j")
@@ -299,7 +320,9 @@ def test_slides_and_a_turn_stand_where_their_body_does(tmp_path: Path, order: st
     for one, value in {**values, "yaw": np.pi / 2}.items():
         data.joint(one).qpos[0] = value
     mujoco.mj_kinematics(model, data)
-    q = robot.q({"x": values.get("sx", 0.0), "y": values.get("sy", 0.0), "theta": np.pi / 2, "arm_j": model.qpos0[-1]})
+    q = robot.q(
+        {"x": values.get("sx", 0.0), "y": values.get("sy", 0.0), "theta": np.pi / 2, "arm_j": model.qpos0[-1]}
+    )
     for body in ("base", "arm"):
         placement = nmm.Configuration(robot, q).placement(body)
         np.testing.assert_allclose(placement.translation, data.body(body).xpos, atol=1e-12)
@@ -337,13 +360,17 @@ def test_actuators_set_limits_or_are_told(tmp_path: Path) -> None:
         '<velocity joint="free" ctrlrange="-1 1" ctrllimited="false"/>'
     )
     text = world(
-        f'{joints}{"</body>" * 7}',
+        f"{joints}{'</body>' * 7}",
         before='<default><joint actuatorfrcrange="-30 20"/></default>',
         after=f"<actuator>{actuators}</actuator>",
     )
     robot = nmm.load(write(tmp_path / "r.xml", text), platform="fixed")
     speeds = dict(zip(robot.u_names, robot.u_limits.tolist(), strict=True))
-    assert speeds == {"speed": 2.0, "geared": 0.5, **dict.fromkeys(("torque", "place", "twice", "free", "held"), np.inf)}
+    assert speeds == {
+        "speed": 2.0,
+        "geared": 0.5,
+        **dict.fromkeys(("torque", "place", "twice", "free", "held"), np.inf),
+    }
     model = robot.model
     efforts = {one: model.effortLimit[model.joints[model.getJointId(one)].idx_v] for one in robot.q_names}
     assert (efforts["torque"], efforts["place"], efforts["held"]) == (10.0, 5.0, 20.0)
@@ -354,16 +381,22 @@ def test_actuators_set_limits_or_are_told(tmp_path: Path) -> None:
 def test_findings_have_the_files_own_lines(tmp_path: Path) -> None:
     text = world(
         '\n<include file="part.xml"/>',
-        '\n<body name="a">\n<joint name="j" range="1 -1" limited="true"/>\n<geom type="mesh" mesh="m"/></body>',
+        '\n<body name="a">\n<joint name="j" range="1 -1" limited="true"/>'
+        '\n<geom type="mesh" mesh="m"/></body>',
         before='\n<asset><mesh name="m" file="m.stl"/></asset>',
     )
-    write(tmp_path / "part.xml", '<mujoco>\n<body name="b">\n<geom type="ellipsoid" size="1 1 1"/></body></mujoco>')
+    write(
+        tmp_path / "part.xml",
+        '<mujoco>\n<body name="b">\n<geom type="ellipsoid" size="1 1 1"/></body></mujoco>',
+    )
     path = write(tmp_path / "r.xml", text)
     report = file_report(path)
     assert_found(report.problems, ("limits_crossed", {"line": 5, "joint": "j"}))
     assert not report.expanded
     path.write_text(text.replace('range="1 -1"', 'range="-1 1"'))
-    with refused_for(*[("mesh_missing", {"line": 6, "link": "a", "part": part}) for part in ("visual", "collision")]):
+    with refused_for(
+        *[("mesh_missing", {"line": 6, "link": "a", "part": part}) for part in ("visual", "collision")]
+    ):
         nmm.load(path)
     (note,) = of_code(file_report(path).warnings, "mjcf_left_out")
     assert holds(note, "mjcf_left_out", names=["body b", "mass of mesh m"], file="part.xml", line=2)
@@ -374,15 +407,14 @@ def test_findings_have_the_files_own_lines(tmp_path: Path) -> None:
 
 def test_a_root_that_was_fused_into_the_world_is_named(tmp_path: Path) -> None:
     """What MuJoCo saves of a URDF, with and without the setting that the message names."""
-    urdf = (
-        '<robot name="r"><link name="base"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" '
-        'ixz="0" iyz="0"/></inertial><collision><geometry><box size="1 1 1"/></geometry></collision></link>'
+    inertial = (
+        '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
     )
+    box = '<collision><geometry><box size="1 1 1"/></geometry></collision>'
+    urdf = f'<robot name="r"><link name="base">{inertial}{box}</link>'
     for one in ("l", "r"):
-        urdf += (
-            f'<link name="{one}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
-            f'</inertial></link><joint name="{one}j" type="continuous"><parent link="base"/><child link="{one}"/></joint>'
-        )
+        ends = f'<parent link="base"/><child link="{one}"/>'
+        urdf += f'<link name="{one}">{inertial}</link><joint name="{one}j" type="continuous">{ends}</joint>'
     for setting in ("", '<mujoco><compiler fusestatic="false"/></mujoco>'):
         spec = mujoco.MjSpec.from_string(f"{urdf}{setting}</robot>")
         spec.compile()
@@ -426,20 +458,20 @@ def test_every_element_and_attribute_of_mujoco_is_in_the_table() -> None:
         met.add(found[0])
         missing += [f"{below}: {one}" for one in attributes if how_of(found[1], one) is None]
     assert missing == []
-    assert {path for path in ELEMENTS if path} - met == {"body/worldbody"} - {"body/worldbody"}
+    assert set(ELEMENTS) - met == set()
     for path, row in ELEMENTS.items():
         assert row.why, path
-    # A class has nothing that its elements have not.
-    own = {path.rpartition("/")[2]: set(names) for path, names in elements.items() if "/default" not in path}
+    # What a class gives, its elements have.
     for path, attributes in elements.items():
-        tag = path.rpartition("/")[2]
-        if path.startswith("mujoco/default/") and tag in own:
-            assert set(attributes) - {"class"} <= own[tag] | {"name"}, path
+        if path.startswith("mujoco/default/") and path.count("/") == 2:
+            row = _of_class(path.rpartition("/")[2])[1]
+            assert [one for one in attributes if how_of(row, one) is None] == [], path
 
 
 def test_what_is_not_taken_is_noted_with_its_line(tmp_path: Path) -> None:
     text = world(
-        f'\n<body name="a" gravcomp="1"><joint name="j"/>{BALL}<site name="s"/>\n<body name="b"><joint name="k"/>{BALL}</body></body>',
+        f'\n<body name="a" gravcomp="1"><joint name="j"/>{BALL}<site name="s"/>'
+        f'\n<body name="b"><joint name="k"/>{BALL}</body></body>',
         before='<option gravity="0 0 -1"/><option timestep="0.1"/>',
         after='\n<tendon><fixed><joint joint="j" coef="1"/><joint joint="k" coef="1"/></fixed></tendon>'
         '\n<equality><connect body1="a" body2="b" anchor="0 0 0"/></equality>'
@@ -447,7 +479,9 @@ def test_what_is_not_taken_is_noted_with_its_line(tmp_path: Path) -> None:
     )
     robot = nmm.load(write(tmp_path / "r.xml", text), platform="fixed")
     noted = {
-        name: note.values["lines"][name] for note in of_code(robot.notes, "mjcf_noted") for name in note.values["names"]
+        name: note.values["lines"][name]
+        for note in of_code(robot.notes, "mjcf_noted")
+        for name in note.values["names"]
     }
     assert noted == {"<option> gravity": 1, "<body> gravcomp": 2, "<fixed>": 4, "<connect>": 5}
     assert robot.semantics.disabled == (("a", "b"),)

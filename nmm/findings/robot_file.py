@@ -107,7 +107,7 @@ WORDS = placed(
         "mjcf_several_trees": lambda *, names, fused=False, **_: (
             f"expected one robot, found {len(names)} bodies of the world that move: {few(names)}"
             + (
-                '; if MuJoCo saved it from a URDF: its root link became the world\'s, which <compiler '
+                "; if MuJoCo saved it from a URDF: its root link became the world's, which <compiler "
                 'fusestatic="false"/> in the <mujoco> of the URDF prevents'
                 if fused
                 else ""

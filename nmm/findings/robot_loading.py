@@ -120,8 +120,8 @@ WORDS = placed(
         "shapes_left_out": _names("shapes left out, their meshes are missing: {names}"),
         "base_of_joints": _base_of_joints,
         "gantry": _names(
-            "{names} slide all else and nothing turns it: a gantry, which stands on platform fixed; --platform "
-            'NAME (platform="NAME") puts it on another'
+            "{names} slide all else and nothing turns it: a gantry, on platform fixed; --platform NAME "
+            '(platform="NAME") puts it on another'
         ),
         "arm_mounted": lambda *, name, key, frame, base, prefix, **_: (
             f"{name} mounted{f' as {key}' if key != name else ''} at {frame} of {base}"

@@ -43,8 +43,8 @@ class CheckedUrdf:
 def inspect(
     text: str | Element, find_mesh: FindMesh | None = None, lock: Container[str] = ()
 ) -> tuple[CheckedUrdf | None, list[Finding]]:
-    """A URDF's description (None where the text is none) and its faults, of a text or its <robot>. Without `find_mesh`, mesh files are
-    taken to exist; joints in `lock` will not move, and so follow none."""
+    """A URDF's description (None where the text is none) and its faults, of its text or its <robot>. Without
+    `find_mesh`, mesh files are taken to exist; joints in `lock` will not move, and so follow none."""
     try:
         root = parse(text) if isinstance(text, str) else text
     except XmlError as error:

@@ -19,7 +19,7 @@ from nmm.robots.loading.mjcf_numbers import at, turn
 from nmm.robots.loading.mjcf_parts import line_in, unused
 from nmm.robots.loading.mjcf_reading import Dropped, Mjcf, read_mjcf
 from nmm.robots.loading.mjcf_states import Drives, drives_of, states_of
-from nmm.robots.loading.mjcf_tree import Body, Geom, Joint, Mesh, Site
+from nmm.robots.loading.mjcf_tree import Body, Geom, Inertial, Joint, Mesh, Site
 from nmm.robots.loading.srdf import Srdf
 from nmm.robots.loading.xml_tree import Attributes, Element
 
@@ -95,9 +95,8 @@ class _Writer:
         if len(moving) > 1:
             names = [body.name or "(unnamed)" for body in moving]
             # MuJoCo's way to save a URDF leaves of its root link only the shapes, in the world.
-            fused = all(body.joints and not _is_free(body) for body in moving) and any(
-                geom.kind != "plane" for geom in self.mjcf.world.of(Geom)
-            )
+            of_urdf = all(body.joints and not _is_free(body) and body.of(Inertial) for body in moving)
+            fused = of_urdf and any(geom.kind != "plane" for geom in self.mjcf.world.of(Geom))
             self.faults.add(moving[1].element, "mjcf_several_trees", names=names, fused=fused)
             return
         if moving:

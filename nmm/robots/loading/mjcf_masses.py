@@ -82,7 +82,9 @@ class Masses:
                 continue
             solid = self.solid(geom)
             if solid is None:
-                self.unknown.append(Dropped(f"mass of mesh {geom.mesh.name if geom.mesh else ''}", geom.element))
+                self.unknown.append(
+                    Dropped(f"mass of mesh {geom.mesh.name if geom.mesh else ''}", geom.element)
+                )
                 continue
             mass = geom.density * solid.volume if geom.mass is None else geom.mass
             if mass > 0.0:
@@ -106,7 +108,7 @@ class Masses:
 
     def solid(self, geom: Geom) -> Solid | None:
         """A geom's volume, or its surface, in its own axes; None for a mesh that cannot be read."""
-        mesh = geom.mesh and self.of_mesh(geom.mesh)
+        mesh = None if geom.mesh is None else self.of_mesh(geom.mesh)
         if geom.kind in ("plane", "hfield"):
             return Solid(0.0, np.zeros(3), np.zeros((3, 3)))
         if geom.kind in ("mesh", "sdf"):
@@ -224,7 +226,7 @@ def _hull(vertices: Array) -> tuple[Array, np.ndarray]:
 
 def _weighed(vertices: Array, faces: np.ndarray, how: str) -> Solid:
     """By the tetrahedra from the surface's centroid to each face: "exact"; "convex", of the hull; "shell", by
-    the faces alone; "legacy", where their volumes all count as positive, once more from the centre of mass."""
+    the faces alone; "legacy", where all volumes are positive, once more from the centre of mass."""
     if how == "convex":
         vertices, faces = _hull(vertices)
     corners = vertices[faces]

@@ -1,7 +1,7 @@
 """Every element and attribute of MJCF, and what becomes of it: read, noted, or without effect here.
 
-*Noted* is what MuJoCo moves, weighs or holds otherwise than this robot will: loading says so, with its line, or
-refuses the file by name. *No effect* is what says nothing of motion, shape, mass or limits."""
+*Noted* is what MuJoCo moves, weighs or holds otherwise than this robot will: loading says so, with its line,
+or refuses the file by name. *No effect* is what says nothing of motion, shape, mass or limits."""
 
 from collections.abc import Iterator, Mapping
 from typing import Literal, NamedTuple
@@ -13,7 +13,7 @@ How = Literal["read", "noted", "no effect"]
 
 
 class Row(NamedTuple):
-    """How an element is taken, and why. All attributes of one that is not read go with it; of one that is read
+    """How an element is taken, and why. All attributes of one that is not read go with it; of one that is,
     each is in `attributes`, or means the same in all elements (`EVERYWHERE`)."""
 
     how: How
@@ -52,12 +52,13 @@ _ON_JOINT = (
 #: springs, friction and contact alone, which kinematics does not feel.
 EVERYWHERE: Mapping[str, How] = _table(
     read="name class childclass pos quat axisangle euler xyaxes zaxis",
-    unused="user margin gap solref solimp solreflimit solimplimit solreffriction solimpfriction solmix friction "
-    "condim priority damping frictionloss stiffness springdamper springref springyield delay interp nsample",
+    unused="user margin gap solref solimp solreflimit solimplimit solreffriction solimpfriction solmix "
+    "friction condim priority damping frictionloss stiffness springdamper springref springyield delay interp "
+    "nsample",
 )
 
-#: By the path below <mujoco>. `body` also stands for <worldbody>, <frame> and <replicate>, whose contents are a
-#: body's, and `*` for all elements that are not named before it.
+#: By the path below <mujoco>. `body` also stands for <worldbody>, <frame> and <replicate>, whose contents are
+#: a body's, and `*` for all elements that are not named before it.
 ELEMENTS: Mapping[str, Row] = {
     "": _read("the robot's name", "model"),
     "include": _read("a file beside the main one, else beside the one that includes it", "file"),
@@ -71,12 +72,13 @@ ELEMENTS: Mapping[str, Row] = {
     ),
     "compiler/*": _SOLVER,
     "option": _read(
-        "gravity; the rest is how a simulation solves and steps",
+        "how a simulation solves and steps, but for gravity, which is 9.81 m/s² down here",
         "",
         "gravity",
-        "actuatorgroupdisable ccd_iterations ccd_tolerance cone density impratio integrator iterations jacobian "
-        "ls_iterations ls_tolerance magnetic noslip_iterations noslip_tolerance o_friction o_margin o_solimp "
-        "o_solref sdf_initpoints sdf_iterations sleep_tolerance solver timestep tolerance viscosity wind",
+        "actuatorgroupdisable ccd_iterations ccd_tolerance cone density impratio integrator iterations "
+        "jacobian ls_iterations ls_tolerance magnetic noslip_iterations noslip_tolerance o_friction o_margin "
+        "o_solimp o_solref sdf_initpoints sdf_iterations sleep_tolerance solver timestep tolerance viscosity "
+        "wind",
     ),
     "option/*": _SOLVER,
     "size": _SOLVER,
@@ -97,8 +99,10 @@ ELEMENTS: Mapping[str, Row] = {
     ),
     "asset/mesh/*": _PLUGIN,
     "asset/material": _read(
-        "the colour", "rgba", "", "emission metallic reflectance roughness shininess specular texrepeat texture "
-        "texuniform",
+        "the colour",
+        "rgba",
+        "",
+        "emission metallic reflectance roughness shininess specular texrepeat texture texuniform",
     ),
     "asset/model": _read("what <attach> speaks of", "file", "", "content_type"),
     "asset/*": _PICTURES,

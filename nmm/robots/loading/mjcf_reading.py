@@ -4,18 +4,16 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from typing import NamedTuple, cast
-from xml.etree import ElementTree
+from typing import NamedTuple
 
-import numpy as np
 import pinocchio as pin
 
-from nmm.findings import Finding
-from nmm.findings.robot_file import refusal
 from nmm.robots.loading.budget import MOST_LINKS
-from nmm.robots.loading.mjcf_numbers import ORIGIN, ROTATIONS, Numbers, at, onto, unit
-from nmm.robots.loading.mjcf_tree import Body, Geom, Inertial, Joint, Mesh, Part, Site, moved, names_in, renamed
-from nmm.robots.loading.xml_tree import DEEPEST, Attributes, Element, XmlError, children, parse, read_text
+from nmm.robots.loading.mjcf_elements import Elements
+from nmm.robots.loading.mjcf_files import include, inside, parsed
+from nmm.robots.loading.mjcf_numbers import ORIGIN, ROTATIONS, Numbers, at
+from nmm.robots.loading.mjcf_tree import Body, Part, moved, names_in, renamed
+from nmm.robots.loading.xml_tree import Attributes, Element, children
 
 #: What is asked of <compiler>: what stands without it, and what is understood.
 _SETTINGS = {
@@ -24,7 +22,6 @@ _SETTINGS = {
     "autolimits": ("true", "true|false"),
     "coordinate": ("local", "local"),
 }
-_JOINTS = ("hinge", "slide", "free")
 #: What a body may hold, of which nothing is taken: pictures, and what is no rigid body.
 _LEFT_OUT = ("camera", "light", "plugin", "flexcomp")
 #: What scales a <frame> and all in it.
@@ -39,7 +36,17 @@ _NAMES = {
 }
 #: Actuators of all kinds share a class's defaults for these.
 _OF_ACTUATORS = ("ctrlrange", "ctrllimited", "forcerange", "forcelimited", "gear")
-_ACTUATORS = ("general", "motor", "position", "velocity", "intvelocity", "damper", "cylinder", "muscle", "pid")
+_ACTUATORS = (
+    "general",
+    "motor",
+    "position",
+    "velocity",
+    "intvelocity",
+    "damper",
+    "cylinder",
+    "muscle",
+    "pid",
+)
 
 #: By tag, the attributes that a class gives.
 _Class = dict[str, dict[str, str]]
@@ -79,48 +86,6 @@ def read_mjcf(root: Element, file: Path, faults: Attributes) -> Mjcf:
     return Mjcf(name, model.settings, body, model.references, keys, model.left_out)
 
 
-def include(root: Element, file: Path) -> None:
-    """Puts what other files hold, each read once as in MuJoCo, in the place of <include>."""
-    _include(root, file.parent, file, {file.absolute()}, 0)
-
-
-def _include(parent: Element, folder: Path, main: Path, seen: set[Path], depth: int) -> None:
-    if depth > DEEPEST:
-        raise refusal(main, Finding("nested_too_deep", {"most": DEEPEST}))
-    parts: list[Element] = []
-    for part in inside(parent):
-        if part.tag != "include":
-            _include(part, folder, main, seen, depth + 1)
-            parts.append(part)
-            continue
-        name = part.get("file", "")
-        # Beside the main file, or else beside the one that includes it.
-        file = next((one for one in (main.parent / name, folder / name) if one.is_file()), main.parent / name)
-        place = {"file": name}
-        if file.absolute() in seen:
-            raise refusal(main, Finding("mjcf_included_twice", {}, place))
-        seen.add(file.absolute())
-        included = _parsed(file, name, main)
-        _include(included, file.parent, main, seen, depth + 1)
-        parts += inside(included)
-    parent[:] = parts
-
-
-def _parsed(file: Path, name: str, main: Path) -> Element:
-    """The root element of a file that the main one calls by that name."""
-    place = {"file": name}
-    try:
-        root = parse(read_text(file))
-    except FileNotFoundError:
-        raise refusal(main, Finding("file_unreadable", {"reason": "no such file"}, place)) from None
-    except XmlError as error:
-        line = {**error.finding.where, **place}
-        raise refusal(main, Finding(error.finding.code, error.finding.values, line)) from None
-    for one in cast("Iterator[Element]", root.iter()):
-        one.file = name
-    return root
-
-
 class _Model:
     """One <mujoco> element, with its own units, classes and assets."""
 
@@ -141,8 +106,14 @@ class _Model:
             self._read_class(one, "main", {})
             self._classes[one.get("class", "main")] = self._classes["main"]
         assets = [part for one in children(root, "asset") for part in inside(one)]
-        self._meshes = {one.get("name", _stem(one)): one for one in assets if one.tag == "mesh"}
-        self._colours = {one.get("name"): one.get("rgba") for one in assets if one.tag == "material"}
+        meshes = [self._with_defaults(one, "main") for one in assets if one.tag == "mesh"]
+        self._elements = Elements(
+            self._numbers,
+            self.settings,
+            {one.get("name", _stem(one)): one for one in meshes},
+            {one.get("name", ""): one.get("rgba") for one in assets if one.tag == "material"},
+            folder,
+        )
         self._models = {one.get("name", _stem(one)): one for one in assets if one.tag == "model"}
         self.references = [
             self._with_defaults(one, "main", section)
@@ -193,13 +164,13 @@ class _Model:
                     own = [*self.contents(element, childclass)]
                     yield Body(element, element.get("name", ""), self._numbers.place(element), own)
                 case "joint" | "freejoint":
-                    yield self._joint(self._with_defaults(element, childclass))
+                    yield self._elements.joint(self._with_defaults(element, childclass))
                 case "geom":
-                    yield from self._geom(self._with_defaults(element, childclass))
+                    yield self._elements.geom(self._with_defaults(element, childclass))
                 case "site":
-                    yield self._site(self._with_defaults(element, childclass))
+                    yield self._elements.site(self._with_defaults(element, childclass))
                 case "inertial":
-                    yield self._inertial(element)
+                    yield self._elements.inertial(element)
                 case tag if tag not in _LEFT_OUT:
                     self._faults.add(element, "mjcf_unread", what=f"<{tag}>")
 
@@ -240,7 +211,9 @@ class _Model:
             elif len(replicas) < len(spoken):
                 self.left_out.append(Dropped(f"<{element.tag}> {element.get('name', '')}".strip(), element))
             else:
-                made += [_renamed(element, {key: name + end for key, name in replicas.items()}) for end in ends]
+                made += [
+                    _renamed(element, {key: name + end for key, name in replicas.items()}) for end in ends
+                ]
         self.references = made
 
     def _attach(self, element: Element) -> Iterator[Part]:
@@ -251,7 +224,7 @@ class _Model:
         if asset is None:
             return
         file = self._file.parent / asset.get("file", "")
-        inner = _parsed(file, asset.get("file", ""), self._file)
+        inner = parsed(file, asset.get("file", ""), self._file)
         include(inner, file)
         folder = self._folder / PurePosixPath(asset.get("file", "")).parent
         other = _Model(inner, file, folder, self._faults)
@@ -268,91 +241,10 @@ class _Model:
             spoken = {key: prefix + value for key, value in one.attrib.items() if key in _NAMES}
             if spoken and all((_NAMES[key], value) in names for key, value in spoken.items()):
                 self.references.append(_renamed(one, spoken))
-        for key in (key for one in children(inner, "keyframe") for key in inside(one)):
-            self.left_out.append(Dropped(f"keyframe {key.get('name', '')} of {name}", key))
+        for frame in (key for one in children(inner, "keyframe") for key in inside(one)):
+            self.left_out.append(Dropped(f"keyframe {frame.get('name', '')} of {name}", frame))
         self.left_out += other.left_out
         yield from parts
-
-    def _joint(self, joint: Element) -> Joint:
-        kind = "free" if joint.tag == "freejoint" else joint.get("type", "hinge")
-        name = joint.get("name", "")
-        self._faults.choice(joint, kind, _JOINTS, "joint type", {"joint": name or None})
-        read, scale = self._numbers, self._numbers.degree if kind == "hinge" else 1.0
-        lower, upper = map(float, scale * read.vector(joint, "range", (0.0, 0.0)))
-        limits = (lower, upper) if self._holds(joint, "limited", lower, upper) else None
-        least, most = map(float, read.vector(joint, "actuatorfrcrange", (0.0, 0.0)))
-        bounded = self._holds(joint, "actuatorfrclimited", least, most)
-        return Joint(
-            joint,
-            name,
-            kind,
-            read.vector(joint, "pos", ORIGIN),
-            unit(read.vector(joint, "axis", (0.0, 0.0, 1.0))),
-            scale * read.number(joint, "ref"),
-            limits,
-            min(abs(least), abs(most)) if bounded else None,
-            read.number(joint, "armature"),
-        )
-
-    def _holds(self, element: Element, attribute: str, lower: float, upper: float) -> bool:
-        """Whether a range holds: by that attribute or, as MuJoCo has it, because it is there."""
-        word = element.get(attribute, "auto")
-        return (self.settings["autolimits"] == "true" and lower < upper) if word == "auto" else word == "true"
-
-    def _geom(self, geom: Element) -> Iterator[Geom]:
-        read, name = self._numbers, geom.get("mesh", "")
-        kind = geom.get("type", "sphere")
-        mesh = self._mesh(name) if name in self._meshes else None
-        if name and mesh is None:
-            self._faults.choice(geom, name, [*self._meshes], "mesh", {"part": "<geom>"})
-        geom.set("size", " ".join([*geom.get("size", "").split(), "0", "0", "0"][:3]))
-        size, place = read.vector(geom, "size", ORIGIN), read.place(geom)
-        if geom.get("fromto"):
-            start, end = read.vector(geom, "fromto", (*ORIGIN, *ORIGIN)).reshape(2, 3)
-            size[1:] = size[0], 0.0
-            size[2 if kind in ("box", "ellipsoid") else 1] = 0.5 * np.linalg.norm(end - start)
-            place = pin.SE3(onto(end - start), 0.5 * (start + end))
-        yield Geom(
-            geom,
-            geom.get("name", ""),
-            kind,
-            place,
-            size,
-            mesh,
-            read.number(geom, "mass") if geom.get("mass") is not None else None,
-            read.number(geom, "density", 1000.0),
-            geom.get("shellinertia") == "true",
-            int(read.number(geom, "group")),
-            geom.get("contype", "1") != "0" or geom.get("conaffinity", "1") != "0",
-            geom.get("rgba") or self._colours.get(geom.get("material")),
-        )
-
-    def _mesh(self, name: str) -> Mesh:
-        mesh = self._with_defaults(self._meshes[name], "main")
-        file = mesh.get("file", "")
-        if file:
-            folder = self.settings.get("meshdir", self.settings.get("assetdir", ""))
-            bare = PurePosixPath(file).name if self.settings.get("strippath") == "true" else file
-            file = str(self._folder / folder / bare)
-        reference = pin.SE3(
-            self._numbers.rotation(mesh, "refquat"), self._numbers.vector(mesh, "refpos", ORIGIN)
-        )
-        scale = self._numbers.vector(mesh, "scale", (1.0, 1.0, 1.0))
-        return Mesh(mesh, name, file, scale, reference, mesh.get("inertia", "legacy"))
-
-    def _site(self, site: Element) -> Site:
-        place = self._numbers.place(site)
-        if site.get("fromto"):
-            start, end = self._numbers.vector(site, "fromto", (*ORIGIN, *ORIGIN)).reshape(2, 3)
-            place = pin.SE3(onto(end - start), 0.5 * (start + end))
-        return Site(site, site.get("name", ""), place)
-
-    def _inertial(self, inertial: Element) -> Inertial:
-        read = self._numbers
-        principal = read.vector(inertial, "diaginertia", ORIGIN)
-        xx, yy, zz, xy, xz, yz = read.vector(inertial, "fullinertia", (*principal, *ORIGIN))
-        moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        return Inertial(inertial, read.place(inertial), read.number(inertial, "mass"), moments)
 
 
 def _override(values: dict[str, str], attributes: dict[str, str]) -> None:
@@ -368,11 +260,6 @@ def _renamed(element: Element, names: dict[str, str]) -> Element:
     made.extend(element)
     made.line, made.file = element.line, element.file
     return made
-
-
-def inside(element: ElementTree.Element, deep: bool = False) -> list[Element]:
-    """The elements in one; `deep`: also those in these."""
-    return cast("list[Element]", [*element.iter()][1:] if deep else [*element])
 
 
 def _stem(asset: Element) -> str:

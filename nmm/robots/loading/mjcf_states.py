@@ -1,6 +1,7 @@
 """What an MJCF file says of its robot besides bodies: keyframes as postures, limits that actuators set."""
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,8 +14,8 @@ from nmm.robots.loading.xml_tree import Attributes, Element
 
 #: The root of the states' free body, whose place is x, y, z and a quaternion.
 _ROOT = "root_joint"
-#: Actuators whose control is a force, or a place of the joint.
-_MOTORS, _PLACES = ("motor",), ("position", "intvelocity", "pid")
+#: Actuators that may drive a joint; of others, limits are not taken.
+_DRIVES = ("motor", "velocity", "position")
 
 
 @dataclass
@@ -27,50 +28,48 @@ class Drives:
 
 
 def drives_of(mjcf: Mjcf, faults: Attributes) -> Drives:
-    """A velocity actuator's range of control bounds its joint's velocity, that of a motor, and any range of
-    force, the effort; what a position actuator may ask for is told where it is less than the joint's range."""
+    """What the one actuator of a joint bounds: a velocity actuator's range of control its velocity; that of a
+    motor, and any range of force, its effort. A position actuator that asks for less than its range is told."""
     drives = Drives()
-    ranges = {joint.name: joint.limits for body in mjcf.world.all() for joint in body.joints if joint.name}
+    limits = {joint.name: joint.limits for body in mjcf.world.all() for joint in body.joints if joint.name}
     automatic = mjcf.settings["autolimits"] == "true"
-    on: dict[str, list[Element]] = {}
-    for one in mjcf.references:
-        if one.get("joint", "") in ranges and one.tag not in ("joint", "jointpos", "exclude"):
-            on.setdefault(one.get("joint", ""), []).append(one)
-
-    def ends(element: Element, kind: str, gear: float) -> tuple[float, float] | None:
-        """The range of control or of force, at the joint; None without one."""
-        read = faults.vector(element, f"{kind}range", 2, {"joint": element.get("joint")})
-        lower, upper = read or (0.0, 0.0)
-        holds = element.get(f"{kind}limited", "auto")
-        if holds == "false" or (holds == "auto" and not automatic) or lower >= upper or not gear:
-            return None
-        return (lower, upper) if gear == 1.0 else (lower * gear, upper * gear)
-
-    taken: dict[str, dict[str, float]] = {"velocity": {}, "effort": {}}
+    places: dict[str, Element] = {}
     narrow: dict[str, list[float]] = {}
-    for joint, elements in on.items():
-        if len(elements) != 1:
+    driven = Counter(one.get("joint") for one in mjcf.references)
+    for element in mjcf.references:
+        joint = element.get("joint", "")
+        if element.tag not in _DRIVES or joint not in limits or driven[joint] > 1:
             continue
-        element = elements[0]
-        gears = (element.get("gear", "1").split() or ["1"])[0]
-        gear = Attributes().number(Element("gear", {"gear": gears}), "gear") or 0.0
-        control = ends(element, "ctrl", 1.0 / gear if gear and element.tag not in _MOTORS else gear)
-        force = ends(element, "force", gear)
+        places[joint] = element
+        first = Element("gear", {"gear": (element.get("gear", "").split() or ["1"])[0]})
+        gear = faults.number(first, "gear", {"joint": joint}) or 1.0
+        control, force = (_range(element, kind, automatic, faults) for kind in ("ctrl", "force"))
         if element.tag == "velocity" and control is not None and (bound := _both_ways(control)):
-            taken["velocity"][joint] = bound
-        efforts = [_both_ways(one) for one in (force, control if element.tag in _MOTORS else None) if one]
-        if any(efforts):
-            taken["effort"][joint] = min(one for one in efforts if one)
-        whole = ranges[joint] or (-math.inf, math.inf)
-        if element.tag in _PLACES and control is not None and (control[0] > whole[0] or control[1] < whole[1]):
-            narrow[joint] = [*control]
-    drives.velocity, drives.effort = taken["velocity"], taken["effort"]
-    for kind, code in (("velocity", "mjcf_speeds"), ("effort", "mjcf_efforts")):
-        if taken[kind]:
-            drives.notes.append(Finding(code, {"limits": taken[kind]}, on[next(iter(taken[kind]))][0].place))
+            drives.velocity[joint] = bound / abs(gear)
+        given = [force, control if element.tag == "motor" else None]
+        efforts = [bound * abs(gear) for one in given if one is not None and (bound := _both_ways(one))]
+        if efforts:
+            drives.effort[joint] = min(efforts)
+        if element.tag == "position" and control is not None:
+            lower, upper = sorted(end / gear for end in control)
+            least, most = limits[joint] or (-math.inf, math.inf)
+            if lower > least or upper < most:
+                narrow[joint] = [lower, upper]
+    for code, values in (("mjcf_speeds", drives.velocity), ("mjcf_efforts", drives.effort)):
+        if values:
+            drives.notes.append(Finding(code, {"limits": values}, places[next(iter(values))].place))
     if narrow:
-        drives.notes.append(Finding("mjcf_controls", {"ranges": narrow}, on[next(iter(narrow))][0].place))
+        drives.notes.append(Finding("mjcf_controls", {"ranges": narrow}, places[next(iter(narrow))].place))
     return drives
+
+
+def _range(element: Element, kind: str, automatic: bool, faults: Attributes) -> tuple[float, float] | None:
+    """An actuator's range of control or of force; None without one that holds."""
+    ends = faults.vector(element, f"{kind}range", 2, {"joint": element.get("joint")})
+    word = element.get(f"{kind}limited", "auto")
+    if ends is None or word == "false" or (word == "auto" and not automatic) or ends[0] >= ends[1]:
+        return None
+    return ends[0], ends[1]
 
 
 def _both_ways(ends: tuple[float, float]) -> float | None:
@@ -79,9 +78,7 @@ def _both_ways(ends: tuple[float, float]) -> float | None:
     return least if least > 0.0 else None
 
 
-def states_of(
-    mjcf: Mjcf, file: Path, qpos: Sequence[tuple[str, Joint]]
-) -> tuple[Srdf | None, list[Finding]]:
+def states_of(mjcf: Mjcf, file: Path, qpos: Sequence[tuple[str, Joint]]) -> tuple[Srdf | None, list[Finding]]:
     """Keyframes as an SRDF's states, and the pairs of bodies that are not to collide."""
     states: dict[str, dict[str, tuple[float, ...]]] = {}
     notes: list[Finding] = []

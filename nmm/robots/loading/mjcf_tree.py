@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -11,6 +12,7 @@ from nmm.robots.loading.xml_tree import Element
 
 #: A new name by "body", "joint", "site" or "geom", and the name.
 Rename = Callable[[str, str], str]
+_Kind = TypeVar("_Kind")
 
 
 @dataclass(frozen=True)
@@ -34,8 +36,8 @@ class Joint:
 
 @dataclass(frozen=True)
 class Mesh:
-    """A mesh asset: `file` as the robot's file speaks of it (or numbers in the asset itself), `inertia` how its
-    mass is reckoned."""
+    """A mesh asset: `file` as the robot's file speaks of it, "" for numbers in the asset itself; `inertia`
+    how its mass is reckoned."""
 
     element: Element
     name: str
@@ -88,7 +90,7 @@ class Body:
     place: pin.SE3
     parts: "list[Part]" = field(default_factory=list)
 
-    def of(self, kind: type) -> list:  # type: ignore[type-arg]  # a list of that kind
+    def of(self, kind: type[_Kind]) -> list[_Kind]:
         """The parts of one kind, in the file's order."""
         return [part for part in self.parts if isinstance(part, kind)]
 

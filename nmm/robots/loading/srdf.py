@@ -150,28 +150,27 @@ def with_srdf(robot: Robot, given: str | Path | None, file: Path | None, name: s
 def with_states(robot: Robot, states: Srdf | None, start: Mapping[str, float]) -> Robot:
     """The robot with the postures and the start that its own file names, as an SRDF would."""
     semantics = Semantics() if states is None else _fitted(states, robot, strict=False)
-    moved = next((note.values for note in robot.notes if note.code == "reference_moved"), None)
-    start = {name: value for name, value in start.items() if name in robot.q_names}
-    if moved is not None and "theta" in start:
-        start |= _at_reference(start, *moved["at"][:2], moved["yaw"])
-    postures = {
-        name: values | (_at_reference(values, *moved["at"][:2], moved["yaw"]) if moved and "x" in values else {})
-        for name, values in semantics.postures.items()
-    }
+    start = _at_reference({name: value for name, value in start.items() if name in robot.q_names}, robot)
+    postures = {name: _at_reference(values, robot) for name, values in semantics.postures.items()}
     # The file is the robot's own, no SRDF: notes are on it, too.
     notes = tuple(replace(note, where={}) for note in semantics.notes)
     semantics = replace(semantics, postures=NamedPostures(postures), files=(), notes=(), start=start)
     return replace(robot, **robot.shapes._asdict(), semantics=semantics, notes=(*robot.notes, *notes))
 
 
-def _at_reference(root: Mapping[str, float], x: float, y: float, yaw: float) -> dict[str, float]:
-    """Where the reference point is, with its own yaw, when the root link is there."""
-    cosine, sine = np.cos(root["theta"]), np.sin(root["theta"])
-    return {
-        "x": root["x"] + float(cosine * x - sine * y),
-        "y": root["y"] + float(sine * x + cosine * y),
-        "theta": root["theta"] + yaw,
+def _at_reference(values: Mapping[str, float], robot: Robot) -> dict[str, float]:
+    """Coordinates by name, x, y and theta of the root link given: there of the reference point."""
+    moved = next((note.values for note in robot.notes if note.code == "reference_moved"), None)
+    if moved is None or "theta" not in values:
+        return {**values}
+    x, y = moved["at"][:2]
+    cosine, sine = float(np.cos(values["theta"])), float(np.sin(values["theta"]))
+    place = {
+        "x": values["x"] + cosine * x - sine * y,
+        "y": values["y"] + sine * x + cosine * y,
+        "theta": values["theta"] + moved["yaw"],
     }
+    return {**values, **place}
 
 
 def _fitted(srdf: Srdf, robot: Robot, *, strict: bool) -> Semantics:
