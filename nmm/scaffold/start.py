@@ -131,7 +131,8 @@ def _posture(look: _Look, axes: str) -> Start | None:
         except InputError:
             continue
         if look.at(q).sigma(axes, look.all) >= REGULAR:
-            return Start(q, {POSTURE: name}, axes, "a posture of the robot's SRDF")
+            where = "SRDF" if robot.semantics.files else "file"
+            return Start(q, {POSTURE: name}, axes, f"a posture of the robot's {where}")
     return None
 
 

@@ -83,7 +83,7 @@ class _Writer:
         self.masses = Masses(mjcf, file, faults)
         self.drives: Drives = drives_of(mjcf, faults)
         # Names that are made up give way to the file's.
-        bodies = [*mjcf.world.all()]
+        bodies = [*mjcf.world.all()][1:]
         self._links = {body.name for body in bodies}.union(RESERVED)
         self._joints = {joint.name for body in bodies for joint in body.joints}.union(RESERVED)
         self._written: dict[str, tuple[Element, float]] = {}

@@ -28,8 +28,8 @@ class Drives:
 
 
 def drives_of(mjcf: Mjcf, faults: Attributes) -> Drives:
-    """What the one actuator of a joint bounds: a velocity actuator's range of control its velocity; that of a
-    motor, and any range of force, its effort. A position actuator that asks for less than its range is told."""
+    """What the one actuator of a joint bounds: a velocity actuator's range of control the velocity; that of a
+    motor, and any range of force, the effort. That a position actuator asks for less is told."""
     drives = Drives()
     limits = {joint.name: joint.limits for body in mjcf.world.all() for joint in body.joints if joint.name}
     automatic = mjcf.settings["autolimits"] == "true"
