@@ -78,7 +78,10 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
         "expected one robot, found 2 bodies of the world that move: a, b",
     ),
     "mjcf_left_out": (
-        {"names": ["body table", "shape ellipsoid"], "lines": {"body table": 3, "shape ellipsoid": "a.xml:5"}},
+        {
+            "names": ["body table", "shape ellipsoid"],
+            "lines": {"body table": 3, "shape ellipsoid": "a.xml:5"},
+        },
         {"line": 3},
         "left out of the MJCF file: body table (line 3), shape ellipsoid (a.xml:5)",
     ),
