@@ -17,6 +17,12 @@ from nmm.robots.loading.report import file_report
 
 mujoco: Any = pytest.importorskip("mujoco")
 
+
+@pytest.fixture(autouse=True)
+def _where_mujoco_writes_its_warnings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
 #: Wheels of radius 0.1, 0.2 m to the left and right of their body.
 WHEELS = "".join(
     f'<body name="{side}_wheel" pos="0 {y} 0" euler="-90 0 0"><joint name="{side}_wheel_joint"/>'

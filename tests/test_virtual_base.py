@@ -76,7 +76,7 @@ def test_a_base_of_joints_turns_where_it_stands(tmp_path: Path, joints: tuple[tu
     np.testing.assert_allclose(ahead.homogeneous, slid.homogeneous, atol=1e-12)
 
 
-@pytest.mark.parametrize("end", [20.0, 999999.0])
+@pytest.mark.parametrize("end", [0.3, 20.0, 999999.0])
 @pytest.mark.parametrize("joints", [(AHEAD, ASIDE), (ASIDE, AHEAD), (AHEAD, ("prismatic", "1 1 0"))])
 def test_two_slides_without_a_turn_are_a_gantry(
     tmp_path: Path, joints: tuple[tuple[str, str], ...], end: float

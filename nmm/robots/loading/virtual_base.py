@@ -74,12 +74,12 @@ def find_virtual_base(model: pin.Model, where: str) -> VirtualBase | None:
 
 
 def gantry(model: pin.Model, where: str) -> tuple[str, ...]:
-    """The long level slides, two at least, that move all else before a joint can turn it; none for a base."""
+    """The level slides, two at least, that move all else before a joint can turn it; none for a base."""
     measured = Measured(model, (), where)
-    chain = _chain(measured, _has_room)[0]
+    chain = _chain(measured, _moves)[0]
     if any(measured.is_upright(joint) for joint in chain):
         return ()
-    slides, ways = _chain(measured, _has_room, apart=True)
+    slides, ways = _chain(measured, _moves, apart=True)
     slides = [joint for joint in slides if not measured.is_upright(joint)]
     return tuple(str(model.names[joint]) for joint in slides) if len(ways) > 1 else ()
 
@@ -135,6 +135,11 @@ def _is_endless(model: pin.Model, joint: int) -> bool:
 def _has_room(model: pin.Model, joint: int) -> bool:
     lower, upper = _ends(model, joint)
     return upper - lower >= _ROOM
+
+
+def _moves(model: pin.Model, joint: int) -> bool:
+    lower, upper = _ends(model, joint)
+    return lower < upper
 
 
 def _level_slide(measured: Measured, joint: int) -> Array | None:
