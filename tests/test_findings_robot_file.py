@@ -77,7 +77,39 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
         {},
         "expected one robot, found 2 bodies of the world that move: a, b",
     ),
-    "mjcf_left_out": ({"names": ["body table"]}, {}, "left out of the MJCF file: body table"),
+    "mjcf_left_out": (
+        {
+            "names": ["body table", "shape ellipsoid"],
+            "lines": {"body table": 3, "shape ellipsoid": "a.xml:5"},
+        },
+        {"line": 3},
+        "left out of the MJCF file: body table (line 3), shape ellipsoid (a.xml:5)",
+    ),
+    "mjcf_noted": (
+        {"why": "tendons couple no joints", "names": ["<fixed>"], "lines": {"<fixed>": 7}},
+        {"line": 7},
+        "MJCF: <fixed> (line 7): tendons couple no joints",
+    ),
+    "mjcf_keyframe": (
+        {"name": "home", "size": 9, "got": 7},
+        {"line": 4},
+        "keyframe 'home' has 7 numbers as qpos, the robot has 9: left out",
+    ),
+    "mjcf_speeds": (
+        {"limits": {"wheel": 10.0}},
+        {"line": 4},
+        "velocities are limited by what actuators may ask for: wheel 10 (rad/s, m/s)",
+    ),
+    "mjcf_efforts": (
+        {"limits": {"q1": 5.0}},
+        {"line": 4},
+        "efforts are limited by what actuators give: q1 5 (Nm, N)",
+    ),
+    "mjcf_controls": (
+        {"ranges": {"q1": [-1.0, 0.5]}},
+        {"line": 4},
+        "actuators ask for less than the joints' limits, which are kept: q1 from -1 to 0.5",
+    ),
     "xacro_failed": ({"reason": "division by zero"}, {}, "xacro: division by zero"),
     "xacro_argument_missing": (
         {"name": "l1"},
@@ -458,6 +490,12 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
             "px, py, rz move the whole robot without limits: a base of joints, in whose place is "
             "platform omnidirectional; platform fixed keeps them as coordinates"
         ),
+    ),
+    "gantry": (
+        {"names": ["along", "across"]},
+        {},
+        "along, across slide all else and nothing turns it: a gantry, on platform fixed; --platform NAME "
+        '(platform="NAME") puts it on another',
     ),
     "arm_mounted": (
         {"name": "ur5", "key": "ur5_2", "frame": "top", "base": "cart", "prefix": "ur5_2_"},

@@ -78,6 +78,16 @@ def _path(names: Sequence[str]) -> str:
     return " -> ".join(shown)
 
 
+def _lined(names: Sequence[str], lines: Mapping[str, int | str]) -> str:
+    """Names with their lines, or FILE:LINE."""
+    at = {name: f"line {line}" if isinstance(line, int) else line for name, line in lines.items()}
+    return few([f"{name} ({at[name]})" if name in at else name for name in names])
+
+
+def _values(values: Mapping[str, float]) -> str:
+    return few([f"{name} {value:g}" for name, value in values.items()])
+
+
 def _numbers(values: Sequence[float]) -> str:
     return ", ".join(f"{value:.3g}" for value in values)
 
@@ -122,10 +132,30 @@ WORDS = placed(
         "not_robot": "expected <robot> (URDF) or <mujoco> (MJCF) as the root element, got <{got}>",
         "mjcf_unread": "{what} is not understood, so nothing is read",
         "mjcf_included_twice": "included twice",
-        "mjcf_several_trees": lambda *, names, **_: (
+        "mjcf_several_trees": lambda *, names, fused=False, **_: (
             f"expected one robot, found {len(names)} bodies of the world that move: {few(names)}"
+            + (
+                "; if MuJoCo saved it from a URDF: its root link became the world's, which <compiler "
+                'fusestatic="false"/> in the <mujoco> of the URDF prevents'
+                if fused
+                else ""
+            )
         ),
-        "mjcf_left_out": lambda *, names, **_: f"left out of the MJCF file: {few(names)}",
+        "mjcf_left_out": lambda *, names, lines=(), **_: (
+            f"left out of the MJCF file: {_lined(names, dict(lines))}"
+        ),
+        "mjcf_noted": lambda *, why, names, lines, **_: f"MJCF: {_lined(names, lines)}: {why}",
+        "mjcf_keyframe": "keyframe {name!r} has {got} numbers as qpos, the robot has {size}: left out",
+        "mjcf_speeds": lambda *, limits, **_: (
+            f"velocities are limited by what actuators may ask for: {_values(limits)} (rad/s, m/s)"
+        ),
+        "mjcf_efforts": lambda *, limits, **_: (
+            f"efforts are limited by what actuators give: {_values(limits)} (Nm, N)"
+        ),
+        "mjcf_controls": lambda *, ranges, **_: (
+            "actuators ask for less than the joints' limits, which are kept: "
+            + few([f"{name} from {lower:g} to {upper:g}" for name, (lower, upper) in ranges.items()])
+        ),
         "beyond_bound": "more than {most:,.0f} {what}: no robot needs as many",
         "xacro_left_over": "<{element}/> is left over from xacro: left out",
         "only_macros": _only_macros,

@@ -173,6 +173,10 @@ WORDS = placed(
             "renamed, since the platform's coordinates or inputs have these names: "
             + few([f"{old} is {new}" for old, new in names.items()])
         ),
+        "gantry": _names(
+            "{names} slide all else and nothing turns it: a gantry, on platform fixed; --platform NAME "
+            '(platform="NAME") puts it on another'
+        ),
         "arm_mounted": lambda *, name, key, frame, base, prefix, **_: (
             f"{name} mounted{f' as {key}' if key != name else ''} at {frame} of {base}"
             f"{f', its names with the prefix {prefix}' if prefix else ''}"

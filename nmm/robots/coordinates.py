@@ -196,9 +196,9 @@ class Coordinates:
 
     @property
     def rest(self) -> Array:
-        """The configuration nearest to zero within the limits, (n,)."""
+        """The configuration within the limits nearest to zero, or to where the file has it at first, (n,)."""
         lower, upper = self.q_limits.T
-        return self.following.placed(np.clip(np.zeros(self.n), lower, upper))
+        return self.following.placed(np.clip(self.q(self.semantics.start), lower, upper))
 
     def outside(self, q: ArrayLike, limits: Array | None = None) -> dict[str, str]:
         """The coordinates of q (n,) outside limits (n, 2), by default the robot's: by name, in words."""

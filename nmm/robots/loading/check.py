@@ -59,12 +59,12 @@ class CheckedUrdf:
 
 
 def inspect(
-    text: str, find_mesh: FindMesh | None = None, lock: Container[str] = ()
+    text: str | Element, find_mesh: FindMesh | None = None, lock: Container[str] = ()
 ) -> tuple[CheckedUrdf | None, list[Finding]]:
-    """A URDF's description (None where the text is none) and its faults. Without `find_mesh`, mesh files are
-    taken to exist; joints in `lock` will not move, and so follow none."""
+    """A URDF's description (None where the text is none) and its faults, of its text or its <robot>. Without
+    `find_mesh`, mesh files are taken to exist; joints in `lock` will not move, and so follow none."""
     try:
-        root = parse(text)
+        root = parse(text) if isinstance(text, str) else text
     except XmlError as error:
         return None, [error.finding]
     reader = Attributes()

@@ -124,7 +124,7 @@ def _check_mesh(
     name = reader.text(mesh, "filename", owner)
     found = None if name is None else find_mesh(name)
     if isinstance(found, Finding):
-        reader.found.append(replace(found, where={"line": mesh.line, **owner}))
+        reader.found.append(replace(found, where={**mesh.place, **owner}))
     elif found is not None and found.suffix.lower() not in MESH_SUFFIXES:
         reader.add(mesh, "mesh_format_unknown", owner, mesh=name, available=[*MESH_SUFFIXES])
     elif name is not None and found is not None:
@@ -234,7 +234,7 @@ def _on_bodies(links: list[Element], joints: list[Element], found: Attributes) -
     inertials = {link.get("name", ""): child(link, "inertial") for link in links}
     heavy = {body(name) for name, one in inertials.items() if one is not None and _inertia(one)[0] > 0.0}
     for link, (name, one) in zip(links, inertials.items(), strict=True):
-        if name in above and body(name) == name and name not in heavy:
+        if link.line and name in above and body(name) == name and name not in heavy:
             about = {"moved_by": above[name].get("name"), "inertial": one is not None}
             found.add(link, "body_without_mass", {"link": name}, **about)
 

@@ -20,7 +20,7 @@ from nmm.errors import RobotError, expect_known
 from nmm.findings import Finding
 from nmm.findings.robot_file import refusal
 from nmm.robots.loading.budget import STEPS_OF_A_FILE, BeyondBound, Budget, counted_xacro
-from nmm.robots.loading.mjcf import urdf_of
+from nmm.robots.loading.mjcf import Converted, urdf_of
 from nmm.robots.loading.packages import Packages
 from nmm.robots.loading.xml_tree import Element, XmlError, parse, read_text
 from nmm.text_format import listed, one_line
@@ -37,8 +37,9 @@ _LOCK = threading.RLock()
 
 @dataclass(frozen=True)
 class Description:
-    """URDF text read from `path`; `expanded` by xacro, its lines are not the file's. `arguments` are the
-    xacro arguments used, defaults included; `notes` xacro's warnings."""
+    """The text read from `path`; `expanded` by xacro, its lines are not the file's. `arguments` are the
+    xacro arguments used, defaults included; `notes` xacro's warnings, or what is left out of an MJCF file;
+    `mjcf` what such a file says."""
 
     xml: str
     path: Path
@@ -46,6 +47,12 @@ class Description:
     expanded: bool = False
     arguments: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[Finding, ...] = ()
+    mjcf: Converted | None = None
+
+    @property
+    def urdf(self) -> str | Element:
+        """The URDF's text, or its <robot>, whose elements have the lines of the MJCF file."""
+        return self.xml if self.mjcf is None else self.mjcf.urdf
 
     def placed(self, found: Iterable[Finding]) -> list[Finding]:
         """Findings in its text, without their lines where these are not the file's."""
@@ -83,8 +90,8 @@ def describe(
         except XmlError as error:
             raise refusal(file, error.finding) from None
         if root.tag == "mujoco":
-            xml, notes = urdf_of(root, file)
-            return Description(xml, file, packages, expanded=True, notes=notes)
+            mjcf = urdf_of(root, file)
+            return Description(text, file, packages, notes=mjcf.notes, mjcf=mjcf)
         packages.mesh_folder = _mesh_folder(root)
     return Description(text, file, packages)
 

@@ -15,7 +15,7 @@ from nmm.platforms import Platform, platform_by_name
 from nmm.robots.loading.models import Options, robot_from
 from nmm.robots.loading.packages import PACKAGE, package_file
 from nmm.robots.loading.source import Source, read_file, read_model, source_path
-from nmm.robots.loading.srdf_fitting import with_srdf
+from nmm.robots.loading.srdf_fitting import with_srdf, with_states
 from nmm.robots.robot import Robot
 
 
@@ -133,6 +133,7 @@ def _with_srdf(
     folders: Sequence[str | Path],
 ) -> Robot:
     def held(values: Mapping[str, float]) -> Robot:
-        return robot_from(source, replace(options, lock={**values, **options.lock}))
+        robot = robot_from(source, replace(options, lock={**values, **options.lock}))
+        return robot if source.mjcf is None else with_states(robot, source.mjcf.states, source.mjcf.start)
 
     return with_srdf(held({}), srdf, file, source.name, held, folders)

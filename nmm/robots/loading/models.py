@@ -39,7 +39,7 @@ from nmm.robots.loading.names_apart import (
 )
 from nmm.robots.loading.provenance import Parts, acceleration_notes
 from nmm.robots.loading.source import Source
-from nmm.robots.loading.virtual_base import VirtualBase, find_virtual_base
+from nmm.robots.loading.virtual_base import VirtualBase, find_virtual_base, gantry
 from nmm.robots.loading.wheel_search import find_undercarriage
 from nmm.robots.robot import Robot
 from nmm.robots.wheel import Wheel
@@ -72,9 +72,13 @@ def robot_from(source: Source, options: Options) -> Robot:
     rebuilt.model.name = options.name or source.name
     stated = options.platform.coordinates[len(CHAIN) :] if isinstance(options.platform, Platform) else ()
     made = with_locked(rebuilt, options.lock, source.mimic_joints, where, stated)
-    base = find_virtual_base(made.rebuilt.model, where)
+    base, slides = find_virtual_base(made.rebuilt.model, where), gantry(made.rebuilt.model, where)
+    stands = bool(slides) and options.platform is None and source.platform is None
+    if stands:
+        options, is_fixed, base = replace(options, platform=FixedBase()), True, None
     if base is not None and not is_fixed:
         made = _standing(made, dict.fromkeys(base.joints, 0.0), where)
+        made = replace(made, rebuilt=_about(made.rebuilt, base.place, where))
     undercarriage = find_undercarriage(_measured(made, source), options.wheels, stated)
     if undercarriage.held:
         made = _standing(made, undercarriage.held, where)
@@ -93,6 +97,8 @@ def robot_from(source: Source, options: Options) -> Robot:
             raise error.at(where, RobotError) from None
     made = _turned_up(made, platform, where)
     remarks = [*undercarriage.notes(), *chosen.remarks]
+    if stands:
+        remarks.append(Finding("gantry", {"names": [*slides]}))
     if base is not None:
         platform = base.limited(platform)
         of_base = {new: old for new, old in of_file(names).items() if new in base.joints}
@@ -103,7 +109,7 @@ def robot_from(source: Source, options: Options) -> Robot:
     if added is not None:
         rebuilt = _with_joint(rebuilt, added, where)
     own = _own_joints(platform, rebuilt.model, made.values, where)
-    made = replace(made, rebuilt=_on_platform(rebuilt, platform, own, where))
+    made = replace(made, rebuilt=_on_platform(rebuilt, platform, own, source, where))
     if not platform.coordinates:
         made = renamed(_with_held_wheels(made, options.wheels, source), of_file(names))
         names = {old: new for old, new in names.items() if old not in CHAIN}
@@ -117,7 +123,7 @@ def robot_from(source: Source, options: Options) -> Robot:
         source.provenance,
         locked=made.values,
         mimicked=made.mimicked,
-        platform=chosen.origin,
+        platform="base" if stands else chosen.origin,
         contradictions=chosen.contradictions,
         base=() if base is None or is_fixed else base.joints,
         accelerations=with_names(source.provenance.accelerations, names),
@@ -297,10 +303,24 @@ def _own_joints(
     return own
 
 
-def _on_platform(rebuilt: Rebuilt, platform: Platform, own: Sequence[str], where: str) -> Rebuilt:
+def _about(rebuilt: Rebuilt, place: pin.SE3, where: str) -> Rebuilt:
+    """The model whose x, y and theta count from a place in its root link, and nothing else changes."""
+    model = rebuilt.model.copy()
+    model.jointPlacements[1] = model.jointPlacements[1] * place
+    moved = rebuild(model, rebuilt.geometries, where, root=place.inverse())
+    return replace(moved, notes=rebuilt.notes)
+
+
+def _on_platform(
+    rebuilt: Rebuilt, platform: Platform, own: Sequence[str], source: Source, where: str
+) -> Rebuilt:
     model = rebuilt.model
     if not platform.coordinates:
-        made = rebuild(model, rebuilt.geometries, where, root=model.jointPlacements[1], head=())
+        start = {} if source.mjcf is None else source.mjcf.start
+        x, y, yaw = (start.get(name, 0.0) for name in CHAIN)
+        stands = pin.SE3(pin.utils.rotate("z", yaw), np.array([x, y, 0.0]))
+        root = stands * model.jointPlacements[1]
+        made = rebuild(model, rebuilt.geometries, where, root=root, head=())
     else:
         made = rebuild(model, rebuilt.geometries, where, first=own) if own else rebuilt
     return replace(made, notes=rebuilt.notes)

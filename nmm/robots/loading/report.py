@@ -112,7 +112,7 @@ def _report(description: Description, given: Mapping[str, Any], found: Sequence[
         mesh = meshes[name] = packages.mesh(name)
         return mesh if isinstance(mesh, Path) else None
 
-    checked, problems = inspect(description.xml, find_mesh, given.get("lock") or ())
+    checked, problems = inspect(description.urdf, find_mesh, given.get("lock") or ())
     warnings, facts = [*description.notes], dict[str, str]()
     robot = None
     if checked is not None:
@@ -159,7 +159,7 @@ def _missing_meshes(root: Element, missing: Mapping[str, Finding], asked: str | 
         lost = missing.get(name)
         if lost is not None and _NOWHERE not in name and isinstance(mesh, Element):
             values = {**lost.values, **becomes}
-            found.setdefault(name, replace(lost, values=values, where={"line": mesh.line}))
+            found.setdefault(name, replace(lost, values=values, where=mesh.place))
     return [*found.values()]
 
 

@@ -24,6 +24,7 @@ from nmm.robots.loading.check_parts import mesh_scale, shape_of
 from nmm.robots.loading.description import SUFFIXES, describe
 from nmm.robots.loading.drive_marks import DriveMarks, drive_marks
 from nmm.robots.loading.measured_joints import Undercarriage
+from nmm.robots.loading.mjcf import Converted
 from nmm.robots.loading.packages import PACKAGE, package_file
 from nmm.robots.loading.provenance import Provenance
 from nmm.robots.loading.xml_tree import Element, child, children
@@ -47,7 +48,7 @@ class Source:
     all_pairs : whether we choose the collision pairs
     on_chain : whether its first joints x, y, theta are a platform's, not the file's
     mimic_joints : each after its leader
-    platform : the kind that the file declares
+    platform : the kind that the file declares; mjcf : what a file of MuJoCo's says besides
     marks : what the file's text says of its drive; undercarriage: what its wheels hang on, once found"""
 
     name: str
@@ -65,6 +66,7 @@ class Source:
     provenance: Provenance = field(default_factory=Provenance)
     marks: DriveMarks = field(default_factory=DriveMarks)
     undercarriage: Undercarriage = field(default_factory=Undercarriage)
+    mjcf: Converted | None = None
 
 
 def read_file(
@@ -85,10 +87,12 @@ def read_file(
             return found
         return meshes.setdefault(name, None if isinstance(found, Finding) else found)
 
-    checked, problems = inspect(description.xml, find_mesh, lock)
+    checked, problems = inspect(description.urdf, find_mesh, lock)
     if checked is None or problems:
         raise refusal(where, *problems, lines=not description.expanded)
     model, visual, collision = _pinocchio_models(checked, where)
+    for joint, armature in ({} if description.mjcf is None else description.mjcf.armature).items():
+        model.armature[model.joints[model.getJointId(joint)].idx_v] = armature
     missing = [name for name, file in meshes.items() if file is None]
     left_out = [Finding("shapes_left_out", {"names": missing})] if missing else []
     return Source(
@@ -110,6 +114,7 @@ def read_file(
             dict(packages.found), packages.searched, meshes, accelerations=checked.accelerations
         ),
         marks=drive_marks(checked.root),
+        mjcf=description.mjcf,
     )
 
 

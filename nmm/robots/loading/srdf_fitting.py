@@ -48,7 +48,44 @@ def with_srdf(
         reason = found[0].as_json()  # reading alone is strict
         semantics = Semantics(notes=(Finding("srdf_unused", {"reason": reason}, {"srdf": Path(path).name}),))
     notes = (*robot.notes, *semantics.notes)
+    own = robot.semantics
+    semantics = replace(
+        semantics,
+        postures=NamedPostures({**own.postures, **semantics.postures}),
+        disabled=own.disabled + semantics.disabled,
+        start=own.start,
+    )
     return replace(robot, **robot.shapes._asdict(), semantics=semantics, notes=notes)
+
+
+def with_states(robot: Robot, states: Srdf | None, start: Mapping[str, float]) -> Robot:
+    """The robot with the postures and the start that its own file names, as an SRDF would."""
+    semantics = (
+        Semantics() if states is None else _fitted(_in_robots_names(states, robot), robot, strict=False)
+    )
+    new = robot.renamed
+    named = {new.get(name, name): value for name, value in start.items()}
+    start = _at_reference({name: value for name, value in named.items() if name in robot.q_names}, robot)
+    postures = {name: _at_reference(values, robot) for name, values in semantics.postures.items()}
+    # The file is the robot's own, no SRDF: notes are on it, too.
+    notes = tuple(replace(note, where={}) for note in semantics.notes)
+    semantics = replace(semantics, postures=NamedPostures(postures), files=(), notes=(), start=start)
+    return replace(robot, **robot.shapes._asdict(), semantics=semantics, notes=(*robot.notes, *notes))
+
+
+def _at_reference(values: Mapping[str, float], robot: Robot) -> dict[str, float]:
+    """Coordinates by name, x, y and theta of the root link given: there of the reference point."""
+    moved = next((note.values for note in robot.notes if note.code == "reference_moved"), None)
+    if moved is None or "theta" not in values:
+        return {**values}
+    x, y = moved["at"][:2]
+    cosine, sine = float(np.cos(values["theta"])), float(np.sin(values["theta"]))
+    place = {
+        "x": values["x"] + cosine * x - sine * y,
+        "y": values["y"] + sine * x + cosine * y,
+        "theta": values["theta"] + moved["yaw"],
+    }
+    return {**values, **place}
 
 
 def _without_passive(

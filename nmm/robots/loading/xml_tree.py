@@ -26,6 +26,14 @@ _LATE = re.compile(r"\A(\s+)(<\?xml\b[^>]*\?>)")
 class Element(ElementTree.Element):
     #: 0 where it is not the file's.
     line: int = 0
+    #: The file's name where another one includes it; "" in the file itself.
+    file: str = ""
+
+    @property
+    def place(self) -> dict[str, Any]:
+        """Where it stands, as findings have it in `where`."""
+        place: dict[str, Any] = {"line": self.line} if self.line else {}
+        return {**place, "file": self.file} if self.file else place
 
 
 class XmlError(Exception):
@@ -128,8 +136,7 @@ class Attributes:
     minor: int = 0
 
     def add(self, element: Element | None, code: str, owner: Owner = NOBODY, /, **values: Any) -> None:
-        line = {} if element is None or not element.line else {"line": element.line}
-        self.found.append(Finding(code, values, {**line, **owner}))
+        self.found.append(Finding(code, values, {**({} if element is None else element.place), **owner}))
 
     def text(self, element: Element, attribute: str, owner: Owner) -> str | None:
         """A required attribute; None, and a finding, when it is missing or empty."""
