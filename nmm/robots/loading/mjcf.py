@@ -20,7 +20,7 @@ from nmm.robots.loading.mjcf_parts import line_in, unused
 from nmm.robots.loading.mjcf_reading import Dropped, Mjcf, read_mjcf
 from nmm.robots.loading.mjcf_states import Drives, drives_of, states_of
 from nmm.robots.loading.mjcf_tree import Body, Geom, Inertial, Joint, Mesh, Site
-from nmm.robots.loading.srdf import Srdf
+from nmm.robots.loading.srdf_parts import Srdf
 from nmm.robots.loading.xml_tree import Attributes, Element
 
 #: Geoms of this group and above are not shown.

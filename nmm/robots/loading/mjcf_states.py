@@ -9,7 +9,7 @@ from pathlib import Path
 from nmm.findings import Finding
 from nmm.robots.loading.mjcf_reading import Mjcf
 from nmm.robots.loading.mjcf_tree import Joint
-from nmm.robots.loading.srdf import Srdf
+from nmm.robots.loading.srdf_parts import Srdf
 from nmm.robots.loading.xml_tree import Attributes, Element
 
 #: The root of the states' free body, whose place is x, y, z and a quaternion.

@@ -214,8 +214,6 @@ class _Chosen:
 def _platform(made: Locked, source: Source, options: Options, base: VirtualBase | None) -> _Chosen:
     kind: Platform | str | None = source.platform if options.platform is None else options.platform
     origin = "file" if options.platform is None else "given"
-    if kind is None and base is not None and base.kind is not None:
-        kind, origin = base.kind, "base"
     if _is_fixed(source, options):
         return _Chosen(FixedBase(), origin)  # there is nothing to measure
     measured = _measured(made, source)
@@ -227,7 +225,7 @@ def _platform(made: Locked, source: Source, options: Options, base: VirtualBase 
             found = recognized(layout)
             kind, told, origin = found.kind, found.notes, "wheels" if found.is_told else "default"
             if base is not None and origin == "default":
-                origin = "base"
+                kind, origin = base.kind or kind, "base"
             if origin == "default":
                 names = measured.fixed_wheels
                 told = (Finding("wheels_fixed", {"names": names}) if names else Finding("no_wheels"),)

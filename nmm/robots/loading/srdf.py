@@ -4,7 +4,6 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -15,50 +14,12 @@ from nmm.findings.robot_file import refusal
 from nmm.robots.loading.description import argument_texts, expand
 from nmm.robots.loading.file_elements import SRDF, unread
 from nmm.robots.loading.packages import Packages
+from nmm.robots.loading.srdf_parts import Group, Srdf, VirtualJoint
 from nmm.robots.loading.xml_tree import Element, XmlError, parse, read_text
 
 #: Where it is looked for, from the URDF's folder: MoveIt's packages, example-robot-data, and beside it.
 _FOLDERS = (".", "../srdf", "../config", "../../{stem}_moveit_config/config")
 SUFFIXES = (".srdf", ".srdf.xacro")
-
-
-class Group(NamedTuple):
-    """A named part of a robot: joints, links (for the joint above each), chains (base, tip), other groups."""
-
-    joints: tuple[str, ...]
-    links: tuple[str, ...]
-    groups: tuple[str, ...]
-    chains: tuple[tuple[str, str], ...]
-
-
-class VirtualJoint(NamedTuple):
-    """A joint that an SRDF adds between the world and a link; `motion` is how it moves there, or ""."""
-
-    name: str
-    kind: str
-    child: str
-    motion: str
-
-
-class Srdf(NamedTuple):
-    """A file in its own names.
-
-    states : each state's joint values; states of one name are merged
-    disabled, enabled : pairs of links
-    roots : joints that it adds between the world and the robot
-    untouched : links that may touch all others but for enabled pairs
-    passive : joints without a motor
-    notes : what of it does not count"""
-
-    path: Path
-    states: Mapping[str, Mapping[str, tuple[float, ...]]]
-    groups: Mapping[str, Group]
-    disabled: tuple[tuple[str, str], ...]
-    roots: tuple[VirtualJoint, ...]
-    enabled: tuple[tuple[str, str], ...] = ()
-    untouched: tuple[str, ...] = ()
-    passive: tuple[str, ...] = ()
-    notes: tuple[Finding, ...] = ()
 
 
 def read_srdf(

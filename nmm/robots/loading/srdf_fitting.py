@@ -11,7 +11,8 @@ import pinocchio as pin
 from nmm.errors import RobotError, expect_known
 from nmm.findings import Finding
 from nmm.robots.loading.provenance import provenance_of
-from nmm.robots.loading.srdf import Group, Srdf, read_srdf, srdf_beside
+from nmm.robots.loading.srdf import read_srdf, srdf_beside
+from nmm.robots.loading.srdf_parts import Group, Srdf
 from nmm.robots.robot import Robot
 from nmm.robots.semantics import NamedPostures, Semantics
 
