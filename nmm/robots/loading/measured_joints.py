@@ -37,7 +37,9 @@ from nmm.robots.wheel import Wheel
 _LEAN = 0.2
 # A centre so near the root link's xy plane lies in it: the plane is then not the ground.
 _ON_PLANE = 1e-6
-_SHORT_NAMES = re.compile("caster|castor|(?<![a-z])(?:[lr]w|[fbr][lr]|[lr][fbr])(?![a-z])")
+_SHORT_NAMES = re.compile("caster|castor|(?<![a-z])[lr]w(?![a-z])")
+#: Of joints on the base that turn without end alone: a walking robot's legs are called so, too.
+_CORNERS = re.compile("(?<![a-z])(?:[fbr][lr]|[lr][fbr])(?![a-z])")
 #: Parts of the names of links that are wheels.
 _WHEELS = ("wheel", "tire", "tyre")
 #: Joints that have to be wheels, or the radius (m) of each; None finds them.
@@ -140,7 +142,11 @@ class Measured:
         that of a wheel at the left or right, or at a corner: lw, rw_joint, fl, rear_lr."""
         names = " ".join([str(self.model.names[joint]), *self.links.get(joint, ())]).lower()
         rolls = self.why_not_rolling(joint) is None
-        return is_named(names, _WHEELS) or (rolls and _SHORT_NAMES.search(names) is not None)
+        if is_named(names, _WHEELS) or (rolls and _SHORT_NAMES.search(names)):
+            return True
+        endless = not np.isfinite(_ends(self.model, joint)).any()
+        on_base = int(self.model.parents[joint]) == self.root
+        return rolls and endless and on_base and _CORNERS.search(names) is not None
 
     def carries_wheel_link(self, joint: int) -> bool:
         """Whether a link that is called a wheel is fixed to the joint's body."""
