@@ -5,7 +5,7 @@ from functools import partial
 
 from nmm.errors import SHOWN, RobotError, few, no_such
 from nmm.findings.finding import Finding, Words
-from nmm.text_format import counted, one_line, quoted, short_words
+from nmm.text_format import apart, counted, one_line, quoted, short_words
 
 _PACKAGE = "package {package!r} not found (give its folder in package_dirs, --package-dir)"
 #: Why there is no mesh, by `cause`.
@@ -163,7 +163,9 @@ WORDS = placed(
         ),
         "axis_zero": "<axis> xyz is zero: {got!r}",
         "limit_missing": "a {kind} joint needs a <limit>, this one has none",
-        "limits_crossed": "<limit> lower {lower:g} is above upper {upper:g}",
+        "limits_crossed": lambda *, lower, upper, **_: "<limit> lower {} is above upper {}".format(
+            *apart(lower, upper, digits=6)
+        ),
         "dynamics_empty": "<dynamics> has neither damping nor friction",
         # ------------------------------------------------------------------ what is odd
         "mass_large": "a mass of {mass:g} kg: is that meant?",

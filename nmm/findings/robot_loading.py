@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from nmm.errors import few
 from nmm.findings.robot_file import placed
-from nmm.text_format import quoted
+from nmm.text_format import apart, quoted
 
 #: Why a presumed wheel joint is none, by `why`.
 NO_WHEEL = {
@@ -72,7 +72,7 @@ def _axle_elsewhere(*, root: str, at: Sequence[float], names: Sequence[str], **_
 
 
 def _posture_beyond(*, posture: str, beyond: Mapping[str, Sequence[float]], **_: object) -> str:
-    far = [f"{name} = {value:g} (from {low:g} to {high:g})" for name, (value, low, high) in beyond.items()]
+    far = ["{} = {} (from {} to {})".format(name, *apart(*three, digits=6)) for name, three in beyond.items()]
     return f"posture {posture} is outside limits: {few(far)}"
 
 

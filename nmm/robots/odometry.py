@@ -13,6 +13,7 @@ from nmm.errors import InputError, expect_known, few, no_such
 from nmm.robots.robot import Robot
 from nmm.robots.wheel_rates import wheel_rates, wheel_shares
 from nmm.robots.zero_order_hold import HeldInputs
+from nmm.text_format import apart
 
 #: Where Gauss and Legendre look between two readings, for two looks.
 NODES = 0.5 - math.sqrt(3.0) / 6.0, 0.5 + math.sqrt(3.0) / 6.0
@@ -204,8 +205,9 @@ class Odometry:
         with np.errstate(invalid="ignore"):  # infinite in no time
             most = FASTER * self._fastest * lasted + JUMPS
         for k in np.flatnonzero(np.abs(turned) > most)[:1]:
+            _, allowed = apart(float(abs(turned[k])), float(most[k]), digits=3)
             what = f"{self._counters.names[k]} jumped: it cannot turn so far in {lasted:.3g} s"
-            raise InputError(what, where=self._where, expected=f"at most {most[k]:.3g}", got=float(turned[k]))
+            raise InputError(what, where=self._where, expected=f"at most {allowed}", got=float(turned[k]))
 
     def _by_counter(self, given: float | Mapping[str, float] | None, usual: Array, what: str) -> Array:
         """Numbers (k,), one a counter: the same for all, or by name."""
