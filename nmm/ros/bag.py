@@ -221,6 +221,7 @@ class _Reader:
         times, q = self.joints.sorted() if self._own else (world.sorted()[0], None)
         if q is None:
             q = np.zeros((len(times), robot.n))
+        q = np.where(robot.endless, np.unwrap(q, axis=0), q)
         believed = None
         if mobile:
             first, last = min(world.times), max(world.times)
