@@ -61,7 +61,7 @@ def _changes(value: object) -> object:
     if isinstance(value, Mapping):
         return {str(name): nested(item) for name, item in value.items()}
     if isinstance(value, bool):
-        raise InputError(expected="a number, [lower, upper], or these by name", got=value)
+        raise InputError(expected="a number, or numbers by name", got=value)
     return None if value is None else nested(value)
 
 
