@@ -5,7 +5,7 @@ from functools import partial
 
 from nmm.errors import SHOWN, RobotError, few, no_such
 from nmm.findings.finding import Finding, Words
-from nmm.text_format import counted, one_line, quoted, short_words
+from nmm.text_format import apart, counted, one_line, quoted, short_words
 
 _PACKAGE = "package {package!r} not found (give its folder in package_dirs, --package-dir)"
 #: Why there is no mesh, by `cause`.
@@ -220,7 +220,9 @@ WORDS = placed(
         ),
         "axis_zero": "<axis> xyz is zero: {got!r}",
         "limit_missing": "a {kind} joint needs a <limit>, this one has none",
-        "limits_crossed": "<limit> lower {lower:g} is above upper {upper:g}",
+        "limits_crossed": lambda *, lower, upper, **_: "<limit> lower {} is above upper {}".format(
+            *apart(lower, upper, digits=6)
+        ),
         "turned_twice": "<origin> has both rpy and quat_xyzw, expected one of them",
         "quaternion_zero": "<origin> quat_xyzw is zero: no rotation has it",
         # ------------------------------------------------------------------ what does not count

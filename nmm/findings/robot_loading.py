@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from nmm.errors import few
 from nmm.findings.robot_file import placed
-from nmm.text_format import listed, quoted
+from nmm.text_format import apart, listed, quoted
 
 #: Why a presumed wheel joint is none, by `why`.
 NO_WHEEL = {
@@ -64,7 +64,7 @@ def _base_of_joints(
 
 
 def _posture_beyond(*, posture: str, beyond: Mapping[str, Sequence[float]], **_: object) -> str:
-    far = [f"{name} = {value:g} (from {low:g} to {high:g})" for name, (value, low, high) in beyond.items()]
+    far = ["{} = {} (from {} to {})".format(name, *apart(*three, digits=6)) for name, three in beyond.items()]
     return f"posture {posture} is outside limits: {few(far)}"
 
 

@@ -36,8 +36,7 @@ class Encoders:
         self._steered = steered_wheels(robot)
         self._passive = {joint for wheel in robot.wheels for joint in wheel.joints}
         self._following = {one.joint for one in robot.mimic_joints}
-        turns = ~robot.limited.any(axis=1) & (np.array(robot.q_units) == "rad")
-        self._turning = [i for i in robot.following.independent.tolist() if turns[i]]
+        self._turning = [i for i in robot.following.independent.tolist() if robot.endless[i]]
 
     def q(self, joints: Mapping[str, float], base: ArrayLike | None, near: ArrayLike | None) -> Array:
         """See `Robot.q_from`."""

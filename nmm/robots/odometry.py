@@ -14,6 +14,7 @@ from nmm.robots.encoders import Turns
 from nmm.robots.robot import Robot
 from nmm.robots.wheel_rates import wheel_rates, wheel_shares
 from nmm.robots.zero_order_hold import HeldInputs
+from nmm.text_format import apart
 
 #: Where Gauss and Legendre look between two readings, for two looks.
 NODES = 0.5 - math.sqrt(3.0) / 6.0, 0.5 + math.sqrt(3.0) / 6.0
@@ -174,7 +175,8 @@ class Odometry:
         by = counts - self._turns.counts
         for k in np.flatnonzero(np.abs(by) > most)[:1]:
             what = f"{self._counters.names[k]} jumped: it cannot turn so far in {lasted:.3g} s"
-            raise InputError(what, where=self._where, expected=f"at most {most[k]:.3g}", got=float(by[k]))
+            _, allowed = apart(float(abs(by[k])), float(most[k]), digits=3)
+            raise InputError(what, where=self._where, expected=f"at most {allowed}", got=float(by[k]))
         robot, n_p = self.robot, self.robot.platform.n_p
         turned = self._shares * by
         before, after = self.q[3:n_p], ahead[3:n_p]
