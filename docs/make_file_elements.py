@@ -7,10 +7,21 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from nmm.robots.loading.file_elements import READ, SRDF, URDF, How, Part, Table
+from nmm.robots.loading.mjcf_parts import ELEMENTS, EVERYWHERE
 
 PAGE = Path(__file__).with_name("file_elements.md")
 #: By the format's name, as the page has them.
-TABLES: dict[str, Table] = {"URDF": URDF, "SRDF": SRDF}
+TABLES: dict[str, Table] = {
+    "URDF": URDF,
+    "SRDF": SRDF,
+    "MJCF": {
+        "any element": Part(READ, "", {name: How(how) for name, how in EVERYWHERE.items()}),
+        **{
+            path: Part(row.how, row.why, {name: How(how) for name, how in row.attributes.items()})
+            for path, row in ELEMENTS.items()
+        },
+    },
+}
 
 HEAD = """# What is read of a robot's file
 

@@ -1,7 +1,7 @@
 """Every element and attribute of MJCF, and what becomes of it: read, noted, or without effect here.
 
 *Noted* is what MuJoCo moves, weighs or holds otherwise than this robot will: loading says so, with its line,
-or refuses the file by name. *No effect* is what says nothing of motion, shape, mass or limits."""
+or refuses the file by name. *Without effect* is what says nothing of motion, shape, mass or limits."""
 
 from collections.abc import Iterator, Mapping
 from typing import Literal, NamedTuple
@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 from nmm.findings import Finding
 from nmm.robots.loading.xml_tree import Element
 
-How = Literal["read", "noted", "no effect"]
+How = Literal["read", "noted", "without effect"]
 
 
 class Row(NamedTuple):
@@ -25,7 +25,7 @@ def _table(read: str = "", noted: str = "", unused: str = "") -> dict[str, How]:
     return {
         **dict.fromkeys(read.split(), "read"),
         **dict.fromkeys(noted.split(), "noted"),
-        **dict.fromkeys(unused.split(), "no effect"),
+        **dict.fromkeys(unused.split(), "without effect"),
     }
 
 
@@ -33,10 +33,10 @@ def _read(why: str, read: str = "", noted: str = "", unused: str = "") -> Row:
     return Row("read", why, _table(read, noted, unused))
 
 
-_PICTURES = Row("no effect", "pictures of a simulation")
-_SOLVER = Row("no effect", "how a simulation solves and steps")
-_OWN = Row("no effect", "data of the file's own")
-_ABOVE = Row("no effect", "goes with the element around it")
+_PICTURES = Row("without effect", "pictures of a simulation")
+_SOLVER = Row("without effect", "how a simulation solves and steps")
+_OWN = Row("without effect", "data of the file's own")
+_ABOVE = Row("without effect", "goes with the element around it")
 _SOFT = Row("noted", "soft bodies are no links")
 _HOLDS = Row("noted", "only a joint that follows another is held to anything beside the tree")
 _TENDON = Row("noted", "tendons couple no joints")
@@ -182,7 +182,7 @@ def row_of(path: str) -> tuple[str, Row] | None:
 def how_of(row: Row, attribute: str) -> How | None:
     """What becomes of an attribute of an element; None for one that the table does not know."""
     if row.how != "read":
-        return "no effect"  # it goes with its element
+        return "without effect"  # it goes with its element
     return row.attributes.get(attribute, EVERYWHERE.get(attribute))
 
 
