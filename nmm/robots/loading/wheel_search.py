@@ -123,7 +123,8 @@ class _Search:
         return found
 
     def _candidates(self, rollers: dict[int, list[int]]) -> list[int]:
-        joints = range(self.measured.root + 1, self.measured.model.njoints)
+        some = {roller for joints in rollers.values() for roller in joints}
+        joints = (j for j in range(self.measured.root + 1, self.measured.model.njoints) if j not in some)
         return [
             joint
             for joint in joints
