@@ -356,6 +356,7 @@ def test_meshes_that_are_not_there(tmp_path: Path) -> None:
         ("package_missing", {"package": "nowhere", "by": "package://nowhere"}),
         ("mesh_missing", {**lost, "shape": "refused"}),
         ("mesh_missing", {"line": 2, "mesh": "gone.stl", "cause": "file", "shape": "refused"}),
+        ("no_wheels", {}),
     )
     assert str(tmp_path) in made.warnings[0].values["searched"]
     with pytest.raises(RobotError) as caught:
@@ -528,8 +529,7 @@ def test_wheels_that_could_steer_and_are_casters_are_told(tmp_path: Path) -> Non
     """Once, not as coordinates too, which they are not; no word of casters that trail or are named so."""
 
     def steered(trail: float, name: str = "L_wheel_j1") -> str:
-        limit = '<limit lower="-2" upper="2" velocity="5" effort="5"/>'
-        up = joint(name, "base", "fork", "revolute", AXIS + limit, "")
+        up = joint(name, "base", "fork", "continuous", AXIS + '<limit velocity="5" effort="5"/>', "")
         at, spin = f'<origin xyz="{-trail} 0.01 0.1"/>', '<axis xyz="0 1 0"/><limit velocity="9" effort="5"/>'
         rolling = joint("L_wheel_j2", "fork", "tyre", "continuous", spin, at)
         return wheeled(more=link("fork", inertial()) + link("tyre", inertial()) + up + rolling)
