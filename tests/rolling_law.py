@@ -46,18 +46,16 @@ def slides(name: str, parent: str, at: str, ends: tuple[float, float] = (-0.01, 
     return turns(name, parent, at, UP, ends, kind="prismatic")
 
 
-def tyre(radius: float = 0.1, beside: float = 0.0, more: str = "") -> str:
+def tyre(radius: float = 0.1, beside: float = 0.0) -> str:
     """A cylinder about y, its middle `beside` the joint, m."""
     return (
         f'<visual><origin xyz="0 {beside} 0" rpy="{0.5 * math.pi!r} 0 0"/><geometry>'
-        f'<cylinder radius="{radius}" length="0.04"/></geometry></visual>{more}'
+        f'<cylinder radius="{radius}" length="0.04"/></geometry></visual>'
     )
 
 
-def wheel(
-    name: str, parent: str, at: str, axis: str = LEFT, radius: float = 0.1, rpy: str = "0 0 0", **more: float
-) -> str:
-    return turns(name, parent, at, axis, rpy=rpy, body=tyre(radius, **more))
+def wheel(name: str, parent: str, at: str, axis: str = LEFT, radius: float = 0.1, rpy: str = "0 0 0") -> str:
+    return turns(name, parent, at, axis, rpy=rpy, body=tyre(radius))
 
 
 def base(*parts: str, name: str = "r", arm: str = ARM) -> str:
@@ -117,9 +115,7 @@ class Rolling:
         x, y, _ = self.data.oMi[self.model.getJointId(pivot)].translation
         moves = complex(twist[0] - twist[2] * y, twist[1] + twist[2] * x)
         axis = self._turning(wheel, {})
-        angle = math.remainder(
-            cmath.phase(moves) - math.atan2(-axis[0], axis[1]), math.pi
-        ) * self.sign(pivot)
+        angle = math.remainder(cmath.phase(moves) - math.atan2(-axis[0], axis[1]), math.pi) * self.sign(pivot)
 
         def slip(at: float) -> float:
             return float(self.row(wheel, {pivot: at}) @ twist)

@@ -1,416 +1,25 @@
-"""Which platform a file's wheels allow, against rolling without slip by Pinocchio's own reader of the file."""
+"""Which platform a file's wheels allow, against rolling without slip by Pinocchio's own reader."""
 
 from __future__ import annotations
 
 import math
 import re
 import shlex
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
-from findings import codes, of_code
-from rolling_law import LEFT, UP, Rolling, base, slides, turns, tyre, wheel
+import trimesh
+from findings import assert_found, codes, of_code
+from rolling_law import LEFT, Rolling, base, turns, wheel
 from urdf_parts import write
+from wheeled_cases import CASES, DRIVE, Case, all_corners, corners, pair, steered
 
 import nmm
-
-NARROW = (-0.6, 0.6)
-CORNERS = {"fl": (0.25, 0.2), "fr": (0.25, -0.2), "rl": (-0.25, 0.2), "rr": (-0.25, -0.2)}
-
-
-@dataclass(frozen=True)
-class Case:
-    """What is in a file, and what it is.
-
-    kind : the platform
-    fixed : wheels on the base that neither steer nor slide
-    steered : by wheel, its pivot; casters, which constrain nothing, are not among them
-    lengths : what its numbers say, m, of the platform or of `measured_as`
-    stand : joints that are neither coordinates nor wheels
-    slack : sideways speed for an input of 1, m/s
-    """
-
-    text: str
-    kind: str
-    fixed: tuple[str, ...] = ()
-    steered: Mapping[str, str] = field(default_factory=dict)
-    lengths: Mapping[str, float] = field(default_factory=dict)
-    measured_as: str = ""
-    stand: tuple[str, ...] = ()
-    options: Mapping[str, Any] = field(default_factory=dict)
-    slack: float = 1e-9
-
-
-def pair(x: float = 0.0, y: float = 0.2, names: str = "{}_wheel", **more: Any) -> str:
-    """Two wheels that roll along x."""
-    parent = more.pop("parent", "base_link")
-    return "".join(
-        wheel(names.format(side), parent, f"{x} {way * y} 0.1", **more)
-        for side, way in (("left", 1), ("right", -1))
-    )
-
-
-DRIVE = ("left_wheel", "right_wheel")
-
-
-def steered(
-    x: float, y: float, pivot: str, name: str, ends: tuple[float, float] | None = NARROW, **more: Any
-) -> str:
-    """A wheel below an upright joint."""
-    parent, at = more.pop("parent", "base_link"), more.pop("at", "0 0 0")
-    return turns(pivot, parent, f"{x} {y} 0.1", more.pop("upright", UP), ends) + wheel(
-        name, f"{pivot}_link", at, **more
-    )
-
-
-def front(x: float, y: float = 0.2, pivots: str = "{}_steer", **more: Any) -> str:
-    return "".join(
-        steered(x, way * y, pivots.format(side), f"front_{side}_wheel", **more)
-        for side, way in (("left", 1), ("right", -1))
-    )
-
-
-def fronts(pivots: str = "{}_steer") -> dict[str, str]:
-    return {f"front_{side}_wheel": pivots.format(side) for side in ("left", "right")}
-
-
-def corners(names: str = "{}_wheel", axis: str = LEFT, **more: Any) -> str:
-    return "".join(
-        wheel(names.format(name), "base_link", f"{x} {y} 0.1", axis, **more) for name, (x, y) in CORNERS.items()
-    )
-
-
-def all_corners(names: str = "{}_wheel") -> tuple[str, ...]:
-    return tuple(names.format(name) for name in CORNERS)
-
-
-def casters(names: str = "{}_pivot", ends: tuple[float, float] | None = None, trail: float = 0.0) -> str:
-    return "".join(
-        steered(x, y, names.format(name), f"{name}_wheel", ends, at=f"{-trail} 0 0")
-        for name, (x, y) in CORNERS.items()
-    )
-
-
-def on_pivots(names: str = "{}_pivot") -> dict[str, str]:
-    return {f"{name}_wheel": names.format(name) for name in CORNERS}
-
-
-def ball(name: str, at: str, joints: int) -> str:
-    """Joints about x, y and z, each right below the one before."""
-    parent, text = "roll_link", ""
-    for k, axis in enumerate(("1 0 0", "0 1 0", "0 0 1")[:joints]):
-        text += turns(f"{name}_{k}", parent, at if k == 0 else "0 0 0", axis)
-        parent = f"{name}_{k}_link"
-    return text
-
-
-def module(joints: int) -> str:
-    """Two driven wheels behind an upright joint through the base's middle, and balls that carry the rest."""
-    below = "".join(
-        wheel(f"{side}_drive_wheel", "roll_link", f"-0.11 {y} 0.04", radius=0.04)
-        for side, y in (("left", 0.13), ("right", -0.13))
-    )
-    turning = (
-        '<link name="roll_link"/><joint name="base_roll_joint" type="continuous"><parent link="base_link"/>'
-        '<child link="roll_link"/><axis xyz="0 0 1"/></joint>'
-    )
-    return base(turning, below, ball("passive_wheel", "0.15 0 0.03", joints))
-
-
-def around(count: int, radius: float = 0.2, names: str = "wheel_{}", more: str = "") -> str:
-    """Wheels whose axes meet in the middle."""
-    text = ""
-    for k in range(count):
-        angle = 2.0 * math.pi * k / count
-        name = names.format(k)
-        at = f"{radius * math.cos(angle)!r} {radius * math.sin(angle)!r} 0.05"
-        text += wheel(name, "base_link", at, LEFT, 0.05, rpy=f"0 0 {angle + 0.5 * math.pi!r}")
-        text += more.replace("WHEEL", name)
-    return text
-
-
-def rim(name: str, radius: float, aslant: float, count: int = 8) -> str:
-    """Rollers around a wheel that turns about y, at `aslant` to its axis, rad; pi/2 for an omni wheel's."""
-    text = ""
-    for k in range(count):
-        angle = 2.0 * math.pi * k / count
-        x, z = math.cos(angle), math.sin(angle)
-        tangent = np.array([-z, 0.0, x])
-        axis = math.cos(aslant) * np.array([0.0, 1.0, 0.0]) + math.sin(aslant) * tangent
-        at = f"{radius * x!r} 0 {radius * z!r}"
-        text += turns(f"{name}_roller_{k}", f"{name}_link", at, " ".join(map(repr, map(float, axis))))
-    return text
-
-
-def rollers(names: tuple[str, ...], count: int = 8) -> tuple[str, ...]:
-    return tuple(f"{name}_roller_{k}" for name in names for k in range(count))
-
-
-def marked(text: str, more: str) -> str:
-    return text.replace("</robot>", f"{more}</robot>")
-
-
-FREE_ASIDE = "".join(
-    f'<gazebo reference="{name}_wheel_link"><mu1>1.0</mu1><mu2>0.0</mu2></gazebo>' for name in CORNERS
-)
-ROCKERS = "".join(
-    turns(f"{side}_rocker", "base_link", f"0 {y} 0.2", LEFT, (-0.3, 0.3))
-    + "".join(
-        wheel(f"{end}_{side}_wheel", f"{side}_rocker_link", f"{x} {0.05 if y > 0 else -0.05} -0.1")
-        for end, x in (("front", 0.3), ("rear", -0.3))
-    )
-    for side, y in (("left", 0.2), ("right", -0.2))
-)
-BOGIES = "".join(
-    turns(f"{side}_rocker", "base_link", f"0 {y} 0.3", LEFT, (-0.5, 0.5))
-    + wheel(f"front_{side}_wheel", f"{side}_rocker_link", "0.4 0 -0.2")
-    + turns(f"{side}_bogie", f"{side}_rocker_link", "-0.2 0 -0.1", LEFT, (-0.5, 0.5))
-    + wheel(f"middle_{side}_wheel", f"{side}_bogie_link", "0.2 0 -0.1")
-    + wheel(f"rear_{side}_wheel", f"{side}_bogie_link", "-0.2 0 -0.1")
-    for side, y in (("left", 0.25), ("right", -0.25))
-)
-SHOCKS = "".join(
-    slides(f"{side}_shock", "base_link", f"0.8 {y} 0.1")
-    + turns(f"{side}_knuckle", f"{side}_shock_link", "0 0 0", UP, NARROW)
-    + wheel(f"front_{side}_wheel", f"{side}_knuckle_link", "0 0 0")
-    for side, y in (("left", 0.3), ("right", -0.3))
-)
-SPRUNG = "".join(
-    slides(f"{side}_suspension", "base_link", f"0 {y} 0.1", (-0.005, 0.005))
-    + wheel(f"{side}_wheel", f"{side}_suspension_link", "0 0 0")
-    for side, y in (("left", 0.2), ("right", -0.2))
-)
-TRACKS = "".join(
-    "".join(
-        wheel(f"{side}_wheel_{k}", "base_link", f"{x} {y} 0.1") for k, x in enumerate((-0.3, 0.0, 0.3))
-    )
-    + "".join(
-        wheel(f"{side}_{end}_idler_wheel", "base_link", f"{x} {y} 0.2")
-        for end, x in (("front", 0.5), ("rear", -0.5))
-    )
-    for side, y in (("left", 0.25), ("right", -0.25))
-)
-CABIN = turns("steering_wheel", "base_link", "0.4 0.2 0.9", "-0.6 0 0.8", body=tyre(0.15))
-CLIMBING = "".join(wheel(f"{side}_climbing_wheel", "base_link", f"0.3 {y} 0.18") for side, y in (("left", 0.2), ("right", -0.2)))
-SWIVELS = "".join(
-    turns(f"caster_{side}", "base_link", f"-0.3 {y} 0.1", UP)
-    + wheel(f"caster_{side}_wheel", f"caster_{side}_link", "-0.04 0 -0.05", radius=0.05)
-    for side, y in (("left", 0.15), ("right", -0.15))
-)
-POLISHER = turns("flip", "hand_link", "0.2 0 0", UP, (-1.0, 1.0)).replace('parent link="hand_link"', 'parent link="hand"') + wheel(
-    "polishing_wheel", "flip_link", "0.1 0 0", radius=0.03
-)
-TURRET = turns("camera_turret", "base_link", "0 0 0.4", UP, (-1.0, 1.0)) + (
-    turns("camera_tilt", "camera_turret_link", "0 0 0.1", LEFT, (-0.5, 0.5))
-    + wheel("focus_wheel", "camera_turret_link", "0.1 0 0", radius=0.02)
-)
-
-CASES = {
-    # Springs, rockers, bogies and shocks stand still; what is below them are the wheels.
-    "sprung": Case(
-        base(SPRUNG), "unicycle", DRIVE, {}, {"radius": 0.1, "track": 0.4}, "differential",
-        ("left_suspension", "right_suspension"),
-    ),
-    "sprung, with casters": Case(base(SPRUNG, SWIVELS), "unicycle", DRIVE),
-    "rockers": Case(
-        base(ROCKERS), "skid_steer",
-        lengths={"radius": 0.1, "length": 0.6, "width": 0.5}, stand=("left_rocker", "right_rocker"),
-        fixed=tuple(f"{end}_{side}_wheel" for end in ("front", "rear") for side in ("left", "right")),
-    ),
-    "rockers and bogies": Case(
-        base(BOGIES), "skid_steer", lengths={"radius": 0.1, "length": 0.8, "width": 0.5},
-        stand=tuple(f"{side}_{part}" for side in ("left", "right") for part in ("rocker", "bogie")),
-        fixed=tuple(f"{end}_{side}_wheel" for end in ("front", "middle", "rear") for side in ("left", "right")),
-    ),
-    "shocks above what steers": Case(
-        base(pair(y=0.3), SHOCKS), "car", DRIVE, fronts("{}_knuckle"), {"wheelbase": 0.8},
-        stand=("left_shock", "right_shock"),
-    ),
-    # Digits of real files.
-    "3.14 about x": Case(
-        base(
-            wheel("left_wheel", "base_link", "0 0.2 0.1"),
-            wheel("right_wheel", "base_link", "0 -0.2 0.1", "0 -1 0", rpy="3.14 0 0"),
-        ),
-        "unicycle", DRIVE, {}, {"radius": 0.1, "track": 0.4}, "differential", slack=5e-3,
-    ),
-    "3.14 about z": Case(
-        base(
-            wheel("left_wheel", "base_link", "0 0.2 0.1"),
-            wheel("right_wheel", "base_link", "0 -0.2 0.1", LEFT, rpy="0 0 3.14"),
-        ),
-        "unicycle", DRIVE, {}, {"radius": 0.1, "track": 0.4}, "differential", slack=5e-3,
-    ),
-    "a pair that is 3 mm from even": Case(
-        base(
-            wheel("left_wheel", "base_link", "0.0015 0.2015 0.1"),
-            wheel("right_wheel", "base_link", "-0.0015 -0.2 0.1"),
-        ),
-        "unicycle", DRIVE, {}, {"radius": 0.1, "track": 0.4015}, "differential", slack=5e-3,
-    ),
-    # Cars, whatever their joints are called, wherever their root is.
-    "a car from its middle": Case(
-        base(pair(-0.5, 0.3, "rear_{}_wheel"), front(0.5, 0.3)), "car",
-        ("rear_left_wheel", "rear_right_wheel"), fronts(), {"wheelbase": 1.0},
-    ),
-    "a car whose hubs steer": Case(
-        base(pair(0.0, 0.3), front(1.0, 0.3, "front_{}_hub")), "car", DRIVE, fronts("front_{}_hub"),
-        {"wheelbase": 1.0},
-    ),
-    "a tricycle whose column is called nothing": Case(
-        base(pair(-0.2, 0.3), steered(0.4, 0.0, "j7", "nose_wheel")), "car", DRIVE, {"nose_wheel": "j7"},
-        {"wheelbase": 0.6},
-    ),
-    "a tricycle whose column points down": Case(
-        base(pair(0.0, 0.3), steered(0.7, 0.0, "fork", "nose_wheel", (-0.5, 0.5), upright="0 0 -1")), "car",
-        DRIVE, {"nose_wheel": "fork"}, {"wheelbase": 0.7},
-    ),
-    "kingpins that lean": Case(
-        base(
-            pair(0.0, 0.3),
-            steered(0.9, 0.25, "left_pin", "front_left_wheel", upright="0 -0.1 0.995", at="0 0 0"),
-            steered(0.9, -0.25, "right_pin", "front_right_wheel", upright="0 0.1 0.995", at="0 0 0"),
-        ),
-        "car", DRIVE, fronts("{}_pin"), {"wheelbase": 0.9}, slack=5e-3,
-    ),
-    "a car with a steering wheel in its cabin": Case(
-        base(pair(0.0, 0.3), front(0.9, 0.3), CABIN), "car", DRIVE, fronts(), {"wheelbase": 0.9}
-    ),
-    "columns that are given": Case(
-        base(pair(0.0, 0.3), front(0.9, 0.3, "{}_column", ends=None)), "car", DRIVE, fronts("{}_column"),
-        {"wheelbase": 0.9}, options={"steer": ["left_column", "right_column"]},
-    ),
-    "the same, not given": Case(
-        base(pair(0.0, 0.3), front(0.9, 0.3, "{}_column", ends=None)), "unicycle", DRIVE
-    ),
-    "a tricycle steered behind": Case(
-        base(pair(0.0, 0.3), steered(-0.8, 0.0, "tail_pivot", "tail_wheel")), "wheeled", DRIVE,
-        {"tail_wheel": "tail_pivot"},
-    ),
-    "a pair steered behind": Case(
-        base(pair(0.0, 0.3), front(-0.8, 0.3, "rear_{}_pivot")), "wheeled", DRIVE,
-        fronts("rear_{}_pivot"),
-    ),
-    "four wheels steered a little": Case(
-        base(casters("{}_steer", (-0.5, 0.5))), "wheeled", (), on_pivots("{}_steer")
-    ),
-    # Bases that go every way.
-    "wheels on pivots called casters": Case(
-        base(casters("caster_joint_{}")), "omnidirectional", (), on_pivots("caster_joint_{}")
-    ),
-    "the same, held": Case(
-        base(casters("caster_joint_{}")), "mecanum", all_corners(),
-        lengths={"radius": 0.1, "length": 0.5, "width": 0.4},
-        options={"lock": {"caster_joint_*": 0.0}, "platform": "mecanum"},
-    ),
-    "modules of a swerve drive": Case(base(casters("{}_module")), "omnidirectional", (), on_pivots("{}_module")),
-    "driven casters": Case(
-        base(casters("{}_rotation", trail=0.03)), "omnidirectional", (), on_pivots("{}_rotation")
-    ),
-    "a base on a turning joint, on balls of two": Case(
-        module(2), "omnidirectional", (), dict.fromkeys(("left_drive_wheel", "right_drive_wheel"), "base_roll_joint"),
-        stand=("passive_wheel_0", "passive_wheel_1"),
-    ),
-    "a base on a turning joint, on balls of three": Case(
-        module(3), "omnidirectional", (), dict.fromkeys(("left_drive_wheel", "right_drive_wheel"), "base_roll_joint"),
-        stand=("passive_wheel_0", "passive_wheel_1", "passive_wheel_2"),
-    ),
-    "three wheels whose axes meet": Case(base(around(3)), "omnidirectional", ("wheel_0", "wheel_1", "wheel_2")),
-    "four whose axes meet": Case(base(around(4)), "omnidirectional", tuple(f"wheel_{k}" for k in range(4))),
-    "omni wheels with rollers": Case(
-        base(around(3), *(rim(f"wheel_{k}", 0.045, 0.5 * math.pi) for k in range(3))), "omnidirectional",
-        ("wheel_0", "wheel_1", "wheel_2"), stand=rollers(("wheel_0", "wheel_1", "wheel_2")),
-    ),
-    "mecanum wheels with rollers": Case(
-        base(corners(), *(rim(name, 0.09, 0.25 * math.pi) for name in all_corners())), "mecanum", all_corners(),
-        lengths={"radius": 0.1, "length": 0.5, "width": 0.4}, stand=rollers(all_corners()),
-    ),
-    "mecanum by name": Case(
-        base(corners("{}_mecanum_wheel")), "mecanum", all_corners("{}_mecanum_wheel"),
-        lengths={"radius": 0.1, "length": 0.5, "width": 0.4},
-    ),
-    "mecanum by friction": Case(marked(base(corners()), FREE_ASIDE), "mecanum", all_corners()),
-    "mecanum by a plugin": Case(
-        marked(
-            base(corners()),
-            '<gazebo><plugin name="drive" filename="libgazebo_ros_mecanum_drive.so"/></gazebo>',
-        ),
-        "mecanum", all_corners(),
-    ),
-    # Several axles.
-    "corners": Case(
-        base(corners("{}")), "skid_steer", all_corners("{}"), lengths={"radius": 0.1, "length": 0.5, "width": 0.4}
-    ),
-    "corners whose tyres are outside": Case(
-        base(
-            *(
-                turns(f"{name}_wheel", "base_link", f"{x} {y} 0.1", LEFT, body=tyre(beside=math.copysign(0.05, y)))
-                for name, (x, y) in CORNERS.items()
-            )
-        ),
-        "skid_steer", all_corners(), lengths={"radius": 0.1, "length": 0.5, "width": 0.5},
-    ),
-    "tracks with idlers": Case(
-        base(TRACKS), "skid_steer", tuple(f"{side}_wheel_{k}" for side in ("left", "right") for k in range(3)),
-        lengths={"radius": 0.1, "length": 0.6, "width": 0.5},
-    ),
-    # One axle.
-    "no wheel by name": Case(
-        base(wheel("j1", "base_link", "0 0.2 0.1"), wheel("j2", "base_link", "0 -0.2 0.1", "0 -1 0")),
-        "unicycle", ("j1", "j2"), {}, {"radius": 0.1, "track": 0.4}, "differential",
-    ),
-    "tyres beside their joints": Case(
-        base(
-            *(
-                turns(f"{side}_wheel", "base_link", f"0 {way * 0.25} 0.1", LEFT, body=tyre(beside=0.03 * way))
-                for side, way in (("left", 1), ("right", -1))
-            )
-        ),
-        "unicycle", DRIVE, {}, {"radius": 0.1, "track": 0.56}, "differential",
-    ),
-    "casters without swivels": Case(
-        base(
-            pair(),
-            *(wheel(f"{end}_caster", "base_link", f"{x} 0 0.05", radius=0.05) for end, x in (("front", 0.3), ("rear", -0.3))),
-        ),
-        "unicycle", DRIVE,
-    ),
-    "the root off the axle": Case(
-        base(pair(-0.3)), "unicycle", DRIVE, {}, {"radius": 0.1, "track": 0.4}, "differential"
-    ),
-    "along y, left at -x": Case(
-        base(
-            wheel("left_wheel", "base_link", "-0.2 0 0.1", "-1 0 0"),
-            wheel("right_wheel", "base_link", "0.2 0 0.1", "-1 0 0"),
-        ),
-        "unicycle", DRIVE, {}, {"radius": 0.1, "track": 0.4}, "differential",
-    ),
-    "along y, left at +x": Case(
-        base(
-            wheel("left_wheel", "base_link", "0.2 0.1 0.1", "1 0 0"),
-            wheel("right_wheel", "base_link", "-0.2 0.1 0.1", "1 0 0"),
-        ),
-        "unicycle", DRIVE, {}, {"radius": 0.1, "track": 0.4}, "differential",
-    ),
-    "along y, by axle": Case(
-        base(
-            wheel("left_wheel", "base_link", "-0.2 0.1 0.1", "-1 0 0"),
-            wheel("right_wheel", "base_link", "0.2 0.1 0.1", "-1 0 0"),
-        ),
-        "unicycle", DRIVE, options={"axle": [0.0, 0.1, 0.0, 0.5 * math.pi]},
-    ),
-    "a wheel at the arm's end": Case(
-        base(pair(), POLISHER), "unicycle", DRIVE
-    ),
-    "a turret with a camera and a wheel": Case(base(pair(), TURRET), "unicycle", DRIVE),
-    "wheels off the ground": Case(base(pair(), CLIMBING), "unicycle", DRIVE),
-    "swivels behind": Case(base(pair(), SWIVELS), "unicycle", DRIVE),
-}  # fmt: skip
+from nmm.cli.exit_status import status_of
+from nmm.robots.loading.report import file_report
 
 
 def loaded(tmp_path: Path, case: Case, **more: Any) -> nmm.Robot:
@@ -424,7 +33,7 @@ def twists(robot: nmm.Robot, q: np.ndarray) -> np.ndarray:
     for u in np.eye(robot.n_u)[: robot.platform.p]:
         pin.forwardKinematics(robot.model, data, q, robot.S(q) @ u)
         motion = pin.getFrameVelocity(robot.model, data, frame, pin.ReferenceFrame.LOCAL)
-        assert abs(motion.linear[2]) < 1e-12 and abs(motion.angular[:2]).max() < 1e-12
+        np.testing.assert_allclose([motion.linear[2], *motion.angular[:2]], 0.0, atol=1e-12)
         found.append([*motion.linear[:2], motion.angular[2]])
     return np.array(found).T
 
@@ -433,7 +42,7 @@ def postures(robot: nmm.Robot, case: Case, law: Rolling) -> list[np.ndarray]:
     """At rest and at two angles of what steers, turned in the world; of several steered wheels such that all
     roll about one point."""
     found = [robot.q({"x": 0.3, "theta": 0.4})]
-    own = [name for name in robot.q_names[3 : robot.platform.n_p]]
+    own = list(robot.q_names[3 : robot.platform.n_p])
     if len(own) > 1:
         middle = np.mean([0.0 if not case.fixed else law.centre(name) for name in case.fixed or ("",)])
         for turn in (0.3, -0.2):
@@ -455,10 +64,7 @@ def test_the_platform_is_what_the_wheels_allow(tmp_path: Path, case: Case) -> No
     assert {wheel.joint for wheel in robot.wheels} >= {*case.fixed, *case.steered}
     names = {str(name) for name in robot.display_model.names}
     assert not {*case.stand} & (names | {*robot.q_names})
-    arm = {"pan", "lift"} | ({"flip", "polishing_wheel"} if "flip" in case.text else set())
-    arm |= {"camera_turret", "camera_tilt", "focus_wheel"} if "turret_link" in case.text else set()
-    arm |= {"steering_wheel"} if "cabin" in case.text or 'name="steering_wheel"' in case.text else set()
-    assert {*robot.q_names[robot.platform.n_p :]} == arm
+    assert {*robot.q_names[robot.platform.n_p :]} == {"pan", "lift", *case.arm}
     shown = loaded(tmp_path, case, platform=case.measured_as) if case.measured_as else robot
     lengths = shown.platform.lengths
     assert {name: lengths[name] for name in case.lengths} == pytest.approx(dict(case.lengths), abs=1e-9)
@@ -475,12 +81,12 @@ def follows(robot: nmm.Robot, q: np.ndarray, case: Case, law: Rolling) -> None:
         if case.fixed and case.kind == "omnidirectional":
             # Without rollers it could turn in place at most; their own turns tell every motion.
             along = [np.cross([0, 0, 1.0], [*row[:2], 0.0])[:2] for row in fixed]
-            rows = [
+            lines = [
                 [*way, way @ [-law.centre(name).imag, law.centre(name).real]]
                 for name, way in zip(case.fixed, along, strict=True)
             ]
             assert np.linalg.matrix_rank(fixed, tol=1e-6) == 2
-            assert np.linalg.matrix_rank(rows, tol=1e-6) == 3
+            assert np.linalg.matrix_rank(lines, tol=1e-6) == 3
         for name, pivot in case.steered.items():
             for twist in moves.T:
                 trails = abs(law.row(name, {}, [pivot])[3]) > 1e-6
@@ -492,12 +98,13 @@ def follows(robot: nmm.Robot, q: np.ndarray, case: Case, law: Rolling) -> None:
         # Without slip they roll straight ahead at most.
         assert np.linalg.matrix_rank(fixed, tol=1e-6) == 2
         straight = moves @ np.ones(platform.p)
-        assert np.abs(fixed @ straight).max() < case.slack and np.linalg.norm(straight) > 1e-3
+        assert np.abs(fixed @ straight).max() < case.slack
+        assert np.linalg.norm(straight) > 1e-3
         return
     own = [name for name in robot.q_names[3 : platform.n_p] if law.model.existJointName(name)]
     rates = robot.S(q)[3 : platform.n_p, : platform.p]
-    rates = np.array([rate * law.sign(name) for name, rate in zip(own, rates, strict=False)])
-    rates = rates.reshape(len(own), platform.p)
+    turned = np.array([rate * law.sign(name) for name, rate in zip(own, rates, strict=False)])
+    turned = turned.reshape(len(own), platform.p)
     angles = {name: float(q[robot.coordinate(name)]) * law.sign(name) for name in own}
     rows = [law.row(name, {}, own) for name in case.fixed]
     fastest = moves[:, np.abs(moves).max(axis=0).argmax()]
@@ -506,7 +113,7 @@ def follows(robot: nmm.Robot, q: np.ndarray, case: Case, law: Rolling) -> None:
         lower, upper = law.ends(pivot)
         assert lower <= at[pivot] <= upper
         rows.append(law.row(name, at, own))
-    sideways = np.array(rows) @ np.vstack([moves, rates])
+    sideways = np.array(rows) @ np.vstack([moves, turned])
     assert np.abs(sideways).max() < case.slack
     if case.slack == 1e-9:
         # The body's motions, and the ways in which the point about which all roll can be moved.
@@ -515,9 +122,152 @@ def follows(robot: nmm.Robot, q: np.ndarray, case: Case, law: Rolling) -> None:
         assert platform.p == free + min(len({*case.steered.values()}), ways)
     if case.kind == "car" and not own:  # the angle of a wheel midway (Ackermann)
         steer = q[robot.coordinate("steer")]
-        if steer:
-            ways = [
-                law.row(name, {pivot: law.pointed(name, pivot, fastest)}) for name, pivot in case.steered.items()
+        if steer and case.steered:
+            axes = [
+                law.row(name, {pivot: law.pointed(name, pivot, fastest)})
+                for name, pivot in case.steered.items()
             ]
-            middle = np.mean([-row[1] / row[0] for row in ways])
+            middle = np.mean([-axis[1] / axis[0] for axis in axes])
             assert middle == pytest.approx(1.0 / math.tan(steer), rel=max(case.slack, 1e-9))
+
+
+@pytest.mark.parametrize(
+    ("name", "ahead"),
+    [("along y, left at -x", [0, 1]), ("along y, left at +x", [0, -1]), ("along y, by axle", [0, 1])],
+)
+def test_ahead_has_left_to_its_left(tmp_path: Path, name: str, ahead: list[float]) -> None:
+    robot = loaded(tmp_path, CASES[name])
+    forward, turning = twists(robot, robot.q()).T
+    np.testing.assert_allclose(forward, [*ahead, 0.0], atol=1e-12)
+    # The middle of the axle stands still while it turns.
+    middle = sum(Rolling(CASES[name].text).centre(wheel) for wheel in DRIVE) / 2
+    np.testing.assert_allclose(turning, [middle.imag, -middle.real, 1.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["the root off the axle", "along y, left at +x", "a car from its middle"])
+def test_where_the_platform_is_is_told(tmp_path: Path, name: str) -> None:
+    case = CASES[name]
+    robot = loaded(tmp_path, case)
+    (note,) = of_code(robot.notes, "reference_moved")
+    middle = np.mean([Rolling(case.text).centre(wheel) for wheel in case.fixed])
+    np.testing.assert_allclose(note.values["at"][:2], [middle.real, middle.imag], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["sprung", "rockers", "wheel drops", "mecanum wheels with rollers"])
+def test_what_stands_still_is_told(tmp_path: Path, name: str) -> None:
+    (note,) = of_code(loaded(tmp_path, CASES[name]).notes, "undercarriage_held")
+    assert set(note.values["values"]) == {*CASES[name].stand}
+    assert set(note.values["values"].values()) == {0.0}
+
+
+def test_wheels_that_do_not_turn_are_told(tmp_path: Path) -> None:
+    fixed = base(pair().replace('type="continuous"', 'type="fixed"'))
+    robot = nmm.load(write(tmp_path / "fixed.urdf", fixed))
+    assert robot.platform.name == "unicycle"
+    assert "wheels_fixed" in {note.code for note in robot.notes}
+    bare = nmm.load(write(tmp_path / "bare.urdf", base()))
+    assert "no_wheels" in {note.code for note in bare.notes}
+
+
+BLIND = re.compile("<visual>.*?</visual>", re.DOTALL)
+
+
+def commands(error: nmm.RobotError) -> list[list[str]]:
+    """The options that a refusal names, as typed."""
+    found = re.findall(r"--platform [a-z_]+|--wheels \S+", str(error))
+    assert found
+    return [shlex.split(one.rstrip(",:?")) for one in found]
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        (base(pair(), wheel("back_wheel", "base_link", "-0.3 0 0.1")), "several_axles"),
+        (
+            base(
+                wheel("left_wheel", "base_link", "0 0.2 0.1", "0.3 0.95 0"),
+                wheel("right_wheel", "base_link", "0 -0.2 0.1", "-0.3 0.95 0"),
+            ),
+            "not_parallel",
+        ),
+        (
+            base(pair(), steered(0.3, 0.1, "odd_steer", "odd_wheel"), pair(-0.4, names="{}_tail_wheel")),
+            "steered_otherwise",
+        ),
+    ],
+    ids=["three in a triangle", "two that are not parallel", "two axles and one that steers"],
+)
+def test_what_the_wheels_do_not_tell_is_refused_with_commands_that_load(
+    tmp_path: Path, text: str, why: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path / "r.urdf", text)
+    with pytest.raises(nmm.RobotError) as caught:
+        nmm.load(path)
+    assert_found(file_report(path).problems, ("platform_unclear", {"why": why}))
+    assert len(str(caught.value)) <= 300 + len(str(path))
+    for options in commands(caught.value):
+        assert status_of(["info", str(path), *options]) == 0
+        assert f"{options[1]} platform" in capsys.readouterr().out
+    for command in ("info", "check", "init"):
+        assert status_of([command, str(path)]) != 0
+        told = capsys.readouterr()
+        assert "the wheels do not tell the platform" in told.out + told.err
+
+
+def test_a_radius_that_nothing_tells(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A unicycle needs none; what is driven by wheel speeds says how to give it."""
+    low = BLIND.sub("", base(pair())).replace(' 0.1"', ' 0"')
+    robot = nmm.load(write(tmp_path / "pair.urdf", low))
+    (note,) = of_code(robot.notes, "radius_unknown")
+    assert set(note.values["names"]) == {*DRIVE}
+    assert robot.platform.name == "unicycle"
+    assert {*DRIVE}.isdisjoint(robot.q_names)
+    four = write(tmp_path / "four.urdf", BLIND.sub("", base(corners())).replace(' 0.1"', ' 0"'))
+    with pytest.raises(nmm.RobotError, match="--wheels NAME=METRES") as caught:
+        nmm.load(four)
+    assert commands(caught.value)
+    given = ",".join(f"{name}=0.15" for name in all_corners())
+    assert status_of(["info", str(four), "--wheels", given]) == 0
+    assert "radius: 0.15 m" in capsys.readouterr().out
+    made = nmm.load(four, wheels=dict.fromkeys(all_corners(), 0.15))
+    assert dict(made.platform.lengths) == pytest.approx({"radius": 0.15, "length": 0.5, "width": 0.4})
+
+
+def test_a_mesh_beside_its_joint(tmp_path: Path) -> None:
+    """The track is between tyres: MuJoCo rolls such a base as if its wheels were 0.561 m apart."""
+    tire = trimesh.creation.cylinder(0.1, 0.04, sections=64)
+    tire.apply_transform(trimesh.transformations.rotation_matrix(0.5 * math.pi, [1, 0, 0]))
+    for side, beside in (("left", 0.03), ("right", -0.03)):
+        moved = tire.copy()
+        moved.apply_translation([0, beside, 0])
+        moved.export(tmp_path / f"{side}.stl")
+    text = base(
+        *(
+            turns(
+                f"{side}_wheel",
+                "base_link",
+                f"0 {y} 0.1",
+                LEFT,
+                body=f'<visual><geometry><mesh filename="{side}.stl"/></geometry></visual>',
+            )
+            for side, y in (("left", 0.25), ("right", -0.25))
+        )
+    )
+    robot = nmm.load(write(tmp_path / "r.urdf", text), platform="differential")
+    assert robot.platform.lengths["track"] == pytest.approx(0.56, abs=1e-6)
+    assert robot.platform.lengths["radius"] == pytest.approx(0.1, abs=1e-6)
+
+
+def test_a_run_says_that_wheels_slid(tmp_path: Path) -> None:
+    """By the file's own kinematics: 0.3 m before the reference point they slide at 0.3 m/s for 1 rad/s."""
+    path = write(tmp_path / "r.urdf", base(pair(0.3)))
+    task = nmm.Task(nmm.LinearCoordinates("theta"), nmm.Line([0.0], [0.5], 0.5))
+    runs = {
+        at: nmm.simulate(nmm.Controller(robot, task, nmm.ProjectedGradient()), {}, 0.5, 0.05)
+        for at in (None, (0.0, 0.0))
+        for robot in (nmm.load(path, axle=at),)
+    }
+    assert "wheels_slid" not in codes(runs[None])
+    (found,) = of_code(runs[0.0, 0.0].findings, "wheels_slid")
+    turning = np.abs(runs[0.0, 0.0].q_dot[:, 2]).max()
+    assert found.values["speeds"] == pytest.approx(dict.fromkeys(DRIVE, 0.3 * turning), rel=1e-9)
