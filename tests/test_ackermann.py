@@ -138,8 +138,8 @@ def test_what_is_no_car_is_refused_as_one_and_told_without(tmp_path: Path, text:
     path = write(tmp_path / "car.urdf", text)
     with refused("ackermann: platform car", kind=nmm.RobotError):
         nmm.load(path, platform="car")
-    robot = nmm.load(path)
-    assert robot.platform.name == "unicycle"
+    assert nmm.load(path).platform.name == "wheeled"
+    robot = nmm.load(path, platform="unicycle")
     assert "left_steering_joint" in {
         one.values["name"] for one in of_code(robot.notes, "steering_too_narrow")
     }

@@ -52,10 +52,10 @@ def reported(tmp_path: Path, text: str, name: str = "robot.urdf", **options: obj
 
 
 def warned(tmp_path: Path, text: str, **options: object) -> list[Finding]:
-    """The warnings about a file that has no problems."""
+    """The warnings about a file that has no problems, but that it has no wheels."""
     made = reported(tmp_path, text, **options)
     assert made.problems == ()
-    return [*made.warnings]
+    return [one for one in made.warnings if one.code != "no_wheels"]
 
 
 def moments(xx: float, yy: float, zz: float, xy: float = 0.0, mass: float = 1.0) -> str:
@@ -92,7 +92,8 @@ def test_the_srdf_is_the_one_given(run: Command, tmp_path: Path) -> None:
     assert good.value("SRDF") == "good.srdf: 1 posture"
     far = run("check", "r.urdf", "--srdf", "far.srdf")
     assert far.status == 0
-    (beyond,) = printed(run, "check", "r.urdf", "--srdf", "far.srdf")["warnings"]
+    bare, beyond = printed(run, "check", "r.urdf", "--srdf", "far.srdf")["warnings"]
+    assert holds(bare, "no_wheels")
     assert holds(beyond, "posture_beyond", srdf="far.srdf", posture="up", beyond={"j": [99.0, -1.0, 1.0]})
     none = run("check", "r.urdf", "--srdf", "none.srdf")
     assert none.status == 2
@@ -326,7 +327,8 @@ def test_followers_are_told(tmp_path: Path) -> None:
     )  # fmt: skip
     made = reported(tmp_path, text)
     assert made.facts["followers"] == "first = 2 lead, second = -lead"
-    (warning,) = made.warnings
+    bare, warning = made.warnings
+    assert holds(bare, "no_wheels")
     limits = {"lower": 0.0, "upper": 1.0}
     assert holds(warning, "mimic_limits_ignored", name="second", leader="lead", **limits)
     robot_read = nmm.load(made.file)
@@ -353,6 +355,7 @@ def test_meshes_that_are_not_there(tmp_path: Path) -> None:
         ("package_missing", {"package": "nowhere", "by": "package://nowhere"}),
         ("mesh_missing", {**lost, "shape": "refused"}),
         ("mesh_missing", {"line": 2, "mesh": "gone.stl", "cause": "file", "shape": "refused"}),
+        ("no_wheels", {}),
     )
     assert str(tmp_path) in made.warnings[0].values["searched"]
     with pytest.raises(RobotError) as caught:
@@ -502,13 +505,15 @@ def test_sound_robots_stand_on_their_wheels() -> None:
 
 def test_the_root_link_belongs_on_the_wheels_axle(tmp_path: Path) -> None:
     assert warned(tmp_path, wheeled()) == []
-    (warning,) = warned(tmp_path, wheeled(-0.25))
-    assert holds(warning, "axle_elsewhere", root="base", names=["left_wheel", "right_wheel"])
-    np.testing.assert_allclose(warning.values["at"], [-0.25, 0.0], atol=1e-12)
-    moved = nmm.load(tmp_path / "robot.urdf", axle=(-0.25, 0))
-    np.testing.assert_allclose(np.mean([wheel.center for wheel in moved.wheels], axis=0)[:2], 0.0, atol=1e-15)
-    (warning,) = warned(tmp_path, wheeled(-0.25), axle=(0.1, 0.05, 0.02))  # where it is does not change
-    np.testing.assert_allclose(warning.values["at"], [-0.25, 0.0, 0.02], atol=1e-12)
+    assert warned(tmp_path, wheeled(-0.25)) == []  # for the reference point is moved there
+    for options in ({}, {"axle": (-0.25, 0)}):
+        moved = nmm.load(tmp_path / "robot.urdf", **options)
+        (note,) = of_code(moved.notes, "reference_moved")
+        np.testing.assert_allclose([*note.values["at"], note.values["yaw"]], [-0.25, 0, 0, 0], atol=1e-12)
+        middle = np.mean([wheel.center for wheel in moved.wheels], axis=0)
+        np.testing.assert_allclose(middle[:2], 0.0, atol=1e-15)
+    (warning,) = warned(tmp_path, wheeled(-0.25), axle=(0.1, 0.05, 0.02))
+    assert holds(warning, "wheels_slide", platform="unicycle", several_axles=False, roll="ahead")
 
 
 def test_wheels_that_are_not_recognised_are_told_and_why(tmp_path: Path) -> None:
@@ -523,8 +528,7 @@ def test_wheels_that_could_steer_and_are_casters_are_told(tmp_path: Path) -> Non
     """Once, not as coordinates too, which they are not; no word of casters that trail or are named so."""
 
     def steered(trail: float, name: str = "L_wheel_j1") -> str:
-        limit = '<limit lower="-2" upper="2" velocity="5" effort="5"/>'
-        up = joint(name, "base", "fork", "revolute", AXIS + limit, "")
+        up = joint(name, "base", "fork", "continuous", AXIS + '<limit velocity="5" effort="5"/>', "")
         at, spin = f'<origin xyz="{-trail} 0.01 0.1"/>', '<axis xyz="0 1 0"/><limit velocity="9" effort="5"/>'
         rolling = joint("L_wheel_j2", "fork", "tyre", "continuous", spin, at)
         return wheeled(more=link("fork", inertial()) + link("tyre", inertial()) + up + rolling)

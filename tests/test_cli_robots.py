@@ -131,9 +131,11 @@ def test_info_of_a_scenario_shows_its_robot_and_what_does_not_move_its_task(
     assert "\nv has no effect" not in result.out
     write(tmp_path / "arm.urdf", on_wheels("unicycle"))
     steered = run("info", "--scenario", "car.yaml")
-    assert (
-        "\nsteering has no effect on the task: " in steered.out
-    )  # which is then a joint of the arm that moves nothing
+    assert "they steer, and stand still at zero: steering" in steered.out
+    # Of another name it is a joint of the arm that moves nothing.
+    write(tmp_path / "arm.urdf", on_wheels("unicycle").replace("steering", "wiper"))
+    turned = run("info", "--scenario", "car.yaml")
+    assert "\nwiper has no effect on the task: " in turned.out
     assert "every input moves the task" in run("info", "--scenario", "unicycle_2r_position").out
 
 

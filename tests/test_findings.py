@@ -79,6 +79,13 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
     ),
     ("blocked", {"pairs": ["ee and pillar"]}, {}, "blocked by the distance of ee and pillar"),
     (
+        "wheels_slid",
+        {"speeds": {"left_wheel": 0.2, "right_wheel": 0.1}},
+        {"t": 1.5},
+        "wheels of the robot's file slid sideways, most at t = 1.5 s: left_wheel (up to 0.2 m/s), right_wheel "
+        "(up to 0.1 m/s); is its platform what its wheels allow? (nmm check)",
+    ),
+    (
         "collided",
         {"name": "ee and ball", "depth": 0.02},
         {"t": 0.5},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -380,13 +381,52 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
         ),
     ),
     "radius_unknown": (
-        {"name": "left_wheel"},
+        {"names": ["left_wheel", "right_wheel"]},
         {},
-        (
-            "radius of wheel 'left_wheel' not found: its centre is not above the root link's xy "
-            "plane and it has no cylinder or sphere; give it, --wheels left_wheel=M,... "
-            "(wheels={'left_wheel': ...}), or no wheels, --wheels none (wheels=())"
-        ),
+        "nothing tells the radius of wheels left_wheel, right_wheel: they stand still in playback, and limit "
+        "no speed; give it, --wheels right_wheel=METRES,... (wheels={'right_wheel': ...})",
+    ),
+    "platform_recognized": (
+        {"platform": "skid_steer", "why": "several_axles", "names": ["fl", "fr", "rl", "rr"]},
+        {},
+        "platform skid_steer by its wheels: fl, fr, rl, rr stand on several axles and do not steer, so that "
+        'they slide in turns; with rollers: --platform mecanum (platform="mecanum")',
+    ),
+    "platform_unclear": (
+        {
+            "why": "not_parallel",
+            "names": ["left", "right"],
+            "commands": ["--platform omnidirectional", "--platform unicycle"],
+        },
+        {},
+        "the wheels do not tell the platform: --platform omnidirectional or --platform unicycle? wheels that "
+        "neither steer nor swivel are not parallel: left, right",
+    ),
+    "wheels_fixed": (
+        {"names": ["left_wheel"]},
+        {},
+        "links that are called wheels do not turn in the file (left_wheel): its root is taken for a unicycle, "
+        "--platform for another",
+    ),
+    "no_wheels": (
+        {},
+        {},
+        "no wheels in the file: its root link is taken for a unicycle; --platform for another, --platform "
+        "fixed for an arm that stands",
+    ),
+    "wheels_by_shape": ({"names": ["j1", "j2"]}, {}, "wheels by their shapes, not their names: j1, j2"),
+    "steering_held": ({"names": ["left_hub"]}, {}, "they steer, and stand still at zero: left_hub"),
+    "undercarriage_held": (
+        {"values": {"left_spring": 0.0, "right_spring": 0.005}},
+        {},
+        "between the base and its wheels, standing still: left_spring at 0, right_spring at 0.005; --lock "
+        "NAME=VALUE for another place",
+    ),
+    "tyre_unclear": (
+        {"name": "left_wheel", "middles": [0.03, 0.0]},
+        {},
+        "the shapes of wheel 'left_wheel' disagree on the middle of its tyre, 30, 0 mm along its axis from "
+        "the joint: the first counts",
     ),
     "no_arm": ({}, {}, "no arm: the platform is all that moves"),
     "nothing_moves": ({}, {}, "nothing moves"),
@@ -536,38 +576,6 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
             'no "wheel"'
         ),
     ),
-    "wheels_not_parallel": (
-        {"names": ["left", "right"]},
-        {},
-        "wheels that neither steer nor swivel are not parallel: left, right; with rollers, --platform "
-        'omnidirectional (platform="omnidirectional")',
-    ),
-    "wheels_on_several_axles": (
-        {"names": ["left", "right"]},
-        {},
-        (
-            "wheels that neither steer nor swivel are not on one axle (left, right): the robot slips "
-            'in turns; --platform skid_steer (platform="skid_steer") takes that as its way of '
-            "turning, and says how fast they slide; mecanum and omnidirectional are for wheels with rollers"
-        ),
-    ),
-    "axle_turned": (
-        {"names": ["left", "right"]},
-        {},
-        (
-            "the wheels do not roll along the root link's x axis (left, right); --axle FRAME "
-            "(axle=FRAME) gives the direction"
-        ),
-    ),
-    "axle_elsewhere": (
-        {"root": "base", "at": [-0.25, 0.0], "names": ["left", "right"]},
-        {},
-        (
-            "root link 'base' is not at the wheels' axle, whose midpoint is at (-0.25, 0) m in it "
-            "(left, right): give --axle -0.25,0 (axle=(-0.25, 0)), or the robot turns about the "
-            "wrong point"
-        ),
-    ),
     "ground_uneven": (
         {"heights": {"left": -0.1, "caster": -0.108}, "near": 0.005},
         {},
@@ -596,8 +604,7 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
         {"names": ["left_turn", "right_turn"]},
         {},
         "each turns a wheel about an upright axis through it and is taken for a caster: left_turn, "
-        'right_turn; a platform that steers: --platform car (platform="car") with "steer" in their names, or '
-        "one whose wheels are described (WheeledPlatform)",
+        "right_turn; if they steer: --steer left_turn,right_turn (steer=['left_turn', 'right_turn'])",
     ),
     "wheel_radius_differs": (
         {"name": "left", "given": 50.8, "measured": 0.0508},
@@ -708,7 +715,7 @@ def test_other_words_of_the_same_codes() -> None:
     )
     slide = {"platform": "unicycle", "speeds": {"left": 0.2}, "several_axles": True}
     assert "skid_steer" in str(Finding("wheels_slide", slide))
-    assert "--axle FRAME" in str(Finding("wheels_slide", {**slide, "roll": "aside"}))
+    assert "--axle X,Y,Z,YAW" in str(Finding("wheels_slide", {**slide, "roll": "aside"}))
     assert "omnidirectional" in str(Finding("wheels_slide", {**slide, "roll": "apart"}))
     base = {"names": ["px"], "platform": "fixed"}
     assert str(Finding("base_of_joints", base)).endswith("a base of joints, coordinates like others")
@@ -723,6 +730,24 @@ def test_other_words_of_the_same_codes() -> None:
     assert str(Finding("not_numbers", {"element": "mass", "attribute": "value", "count": 1, "got": "x"})) == (
         "<mass> value: expected a finite number, got 'x'"
     )
+
+
+@pytest.mark.parametrize("why", ["axes_meet", "rollers", "driven_so", "hitched", "steered", "all_steered"])
+def test_why_it_is_that_platform(why: str) -> None:
+    sentence = str(Finding("platform_recognized", {"platform": "car", "why": why, "names": ["j"]}))
+    assert sentence.startswith("platform car by its wheels: ")
+    assert re.search(r"\bj\b", sentence)
+
+
+UNCLEAR = ["on_swivels", "several_axles", "steered_otherwise", "size_unknown", "rollers_in_line"]
+
+
+@pytest.mark.parametrize("why", UNCLEAR)
+def test_why_it_is_no_platform(why: str) -> None:
+    values = {"why": why, "names": ["j"], "commands": ["--platform car", "--platform unicycle"]}
+    sentence = str(Finding("platform_unclear", values))
+    assert sentence.startswith("the wheels do not tell the platform: --platform car or --platform unicycle? ")
+    assert sentence.endswith(": j")
 
 
 def test_lists_of_names_are_short() -> None:

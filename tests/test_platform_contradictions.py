@@ -153,8 +153,8 @@ def test_a_run_warns_of_it(tmp_path: Path) -> None:
 
 def test_check_warns_of_a_unicycle_that_is_a_car(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write(tmp_path / "car.urdf", car(front=-WHEELBASE))
-    assert status_of(["check", str(path)]) == 0
+    assert status_of(["check", str(path), "--platform", "unicycle"]) == 0
     capsys.readouterr()
-    assert status_of(["check", str(path), "--json"]) == 0
+    assert status_of(["check", str(path), "--json", "--platform", "unicycle"]) == 0
     found = [Finding.from_json(one) for one in json.loads(capsys.readouterr().out)["warnings"]]
     assert any(holds(one, "steering_too_narrow", name="left_steering_joint") for one in found)

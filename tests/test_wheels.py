@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from findings import holds, of_code, refused
+from findings import assert_found, holds, of_code, refused
 from scipy.integrate import solve_ivp
 from urdf_parts import joint, link, robot, write
 
@@ -439,7 +439,6 @@ def test_a_layout_counts_to_the_left_and_leaves_out_what_is_an_arm() -> None:
         (["arm_joint"], "no_wheel"),
         (["up_joint"], "no_wheel"),
         ({"wheel_joint": 0.0}, ""),
-        (["low_joint"], "radius_unknown"),
         (["far_joint"], "no_wheel"),
     ],
 )
@@ -448,10 +447,10 @@ def test_wheels_that_are_none_are_refused(tmp_path: Path, wheels: Any, code: str
     text = robot(
         link("base"),
         turning("wheel", "base", "0 0.2 0.1", LEFT),
-        turning("low", "base", "0 -0.2 0", LEFT),
         turning("up", "base", "0.3 0 0.1", UP),
         turning("arm", "base", "0 0 1", LEFT),
         turning("far", "arm", "0.5 0 0", LEFT),
+        turning("hand", "arm", "0.5 0 0.1", LEFT),
     )
     path = write(tmp_path / "robot.urdf", text)
     for call in (
@@ -469,7 +468,7 @@ def test_wheels_that_are_none_are_refused(tmp_path: Path, wheels: Any, code: str
 
 
 def test_a_swivel_with_something_else_on_it_stays(tmp_path: Path) -> None:
-    """A turret that happens to carry a wheel beside a camera; and a wheel on a suspension."""
+    """A turret that happens to carry a wheel beside a camera; a wheel on a suspension is a wheel."""
     text = robot(
         link("base"),
         turning("turret", "base", "0 0 0.3", UP),
@@ -482,11 +481,14 @@ def test_a_swivel_with_something_else_on_it_stays(tmp_path: Path) -> None:
     )  # fmt: skip
     path = write(tmp_path / "robot.urdf", text)
     loaded = load(path)
-    assert loaded.wheels == ()
-    assert {"wheel_joint", "turret_joint", "camera_joint"} <= set(loaded.q_names)
+    (sprung,) = loaded.wheels
+    assert (sprung.joint, sprung.carrier, sprung.swivel) == ("other_wheel_joint", "theta", "")
+    assert_found(
+        of_code(loaded.notes, "undercarriage_held"), ("undercarriage_held", {"values": {"spring": 0.0}})
+    )
+    assert {*loaded.q_names[3:]} == {"wheel_joint", "turret_joint", "camera_joint"}
     found = {note.values["name"]: note for note in of_code(loaded.notes, "not_a_wheel")}
     assert holds(found["wheel_joint"], "not_a_wheel", why="swivel_carries_more", swivel="turret_joint")
-    assert holds(found["other_wheel_joint"], "not_a_wheel", why="joint_between")
-    # Without its spring, the other one is a wheel on the body.
-    (found,) = load(path, lock={"spring": 0.0}).wheels
-    assert (found.joint, found.carrier, found.swivel) == ("other_wheel_joint", "theta", "")
+    # Its spring may stand elsewhere.
+    (low,) = load(path, lock={"spring": -0.05}).wheels
+    np.testing.assert_allclose(low.center - sprung.center, [0, 0, -0.05], rtol=0, atol=1e-15)

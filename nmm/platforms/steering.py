@@ -116,9 +116,10 @@ class SteeredPair:
 
 
 def steered_pair(layout: Layout) -> SteeredPair | None:
-    """The two steered pivots with wheels beside the x axis, if there are just two, on one axle ahead of the
-    reference point, with wheels that roll ahead on their axes."""
-    steering = [pivot for pivot in steering_pivots(layout) if wheels_on(layout, pivot.joint)]
+    """The two steered pivots beside the x axis, if there are just two, on one axle ahead of the reference
+    point, with wheels that roll ahead on their axes; those without wheels count where none has any."""
+    pivots = steering_pivots(layout)
+    steering = [pivot for pivot in pivots if wheels_on(layout, pivot.joint)] or pivots
     beside = [pivot for pivot in steering if abs(pivot.y) > NEAR]
     if len(beside) != 2:
         return None

@@ -227,9 +227,8 @@ class Measured:
         if asked is None:
             named = [name for name, i in self.joints.items() if self._is_wheel(name, i)]
             candidates = dict.fromkeys(name for name in named if name not in own)
-        elif isinstance(asked, str) or not isinstance(asked, Iterable):
-            raise RobotError(where=f"{self.where}: wheels", expected="a list of joint names", got=asked)
         else:
+            expect_names(asked, self.where)
             for name in asked:
                 expect_known("wheel joint", name, self.joints, self.where, RobotError)
             candidates = asked if isinstance(asked, Mapping) else dict.fromkeys(asked)
@@ -277,6 +276,12 @@ class Measured:
         tyre = next(self.tyres(joint), None)
         aside = self.axis(joint) * (0.0 if tyre is None else tyre.middle)
         return np.asarray(self.placements[joint].translation + aside)
+
+
+def expect_names(asked: Asked, where: str) -> None:
+    """`RobotError` unless `load`'s `wheels` are names, or a radius for each."""
+    if asked is not None and (isinstance(asked, str) or not isinstance(asked, Iterable)):
+        raise RobotError(where=f"{where}: wheels", expected="a list of joint names", got=asked)
 
 
 def measure_layout(measured: Measured, asked: Asked, steer: Collection[str] = ()) -> Layout:

@@ -183,6 +183,8 @@ def _loaded(path: Path, given: Mapping[str, Any]) -> tuple[Robot | None, list[Fi
             read_meshes(shapes.geometryObjects, robot.name)
     except InputError as error:
         inner = error.where.removeprefix(str(path)).removeprefix(": ")
+        if isinstance(error.finding, Finding):
+            return None, [error.finding]
         return None, [*getattr(error, "findings", ())] or [_refused(error.placed(inner))]
     except Exception as error:  # a library's, which `load` did not foresee: a report comes all the same
         values = {"error": type(error).__name__, "reason": one_line(str(error))}

@@ -11,7 +11,7 @@ import numpy as np
 
 from nmm.platforms.wheel_layout import HITCHES, Rollers, is_named
 from nmm.robots.loading.joint_kinds import is_revolute, joint_limits
-from nmm.robots.loading.measured_joints import Asked, Measured, Undercarriage
+from nmm.robots.loading.measured_joints import Asked, Measured, Undercarriage, expect_names
 
 #: Joints at one point are nearer to each other than this, m.
 _TOGETHER = 2e-3
@@ -31,6 +31,7 @@ _ON_GROUND, _ALIKE = 0.3, 0.05
 
 def find_undercarriage(measured: Measured, asked: Asked, own: Collection[str]) -> Undercarriage:
     """What stands still below a base, with joints `own` of its platform, `asked` as in `load`'s `wheels`."""
+    expect_names(asked, measured.where)
     return _Search(measured, asked, frozenset(own)).found()
 
 
@@ -123,7 +124,8 @@ class _Search:
         return found
 
     def _candidates(self, rollers: dict[int, list[int]]) -> list[int]:
-        joints = range(self.measured.root + 1, self.measured.model.njoints)
+        some = {roller for joints in rollers.values() for roller in joints}
+        joints = (j for j in range(self.measured.root + 1, self.measured.model.njoints) if j not in some)
         return [
             joint
             for joint in joints
