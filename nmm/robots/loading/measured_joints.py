@@ -137,10 +137,15 @@ class Measured:
 
     def is_named_wheel(self, joint: int) -> bool:
         """Whether its name or its child link's holds "wheel" or, where it can be a wheel's, "caster", or is
-        that of a wheel at the left or right, or at a corner: lw, rw_joint, fl, rear_lr."""
+        that of a wheel at the left or right, or at a corner: lw, rw_joint, fl, rear_lr. Knees are called so,
+        too: below a leg's joints the short names do not count."""
         names = " ".join([str(self.model.names[joint]), *self.links.get(joint, ())]).lower()
-        rolls = self.why_not_rolling(joint) is None
-        return is_named(names, _WHEELS) or (rolls and _SHORT_NAMES.search(names) is not None)
+        if is_named(names, _WHEELS):
+            return True
+        rolls = self.why_not_rolling(joint) is None and _SHORT_NAMES.search(names) is not None
+        return rolls and not any(
+            is_revolute(self.model.joints[above]) and not self.is_upright(above) for above in self.above(joint)
+        )
 
     def carries_wheel_link(self, joint: int) -> bool:
         """Whether a link that is called a wheel is fixed to the joint's body."""
