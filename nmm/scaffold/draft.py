@@ -161,13 +161,14 @@ def _limits(standing: Standing, start: Start, share: float) -> tuple[dict[str, A
     elif margin <= 0.0:
         why = "usual ones: it tips at rest, at its start already"
     else:
-        why = f"at most {100 * 0.5 * share:.3g} % of what tips it at its start, where it stands {margin:.2g} m"
+        why = (
+            f"at most {100 * 0.5 * share:.3g} % of what tips it at its start, where it stands {margin:.2g} m"
+        )
         why += " inside its wheels"
     about = f"acceleration, m/s² and rad/s²: {why}."
     if not (np.isfinite(robot.u_limits).any() or robot.limited.any()):
         about += " The robot's file has no other limits; velocity: {NAME: 0.5} keeps an input within 0.5."
     return {"acceleration": standing.accelerations(start.q, share)}, about
-
 
 
 def _data(chosen: Chosen, hand: Hand, start: Start, path: HandsPath, kind: str) -> dict[str, Any]:

@@ -55,7 +55,9 @@ def chosen_robot(
         robot, data = _loaded(data, folder)
         return Chosen(robot, data, f"{robot.platform.name}, {_origin(robot)}")
     robot, data = _loaded(_part(source, folder, given), folder)
-    if provenance_of(robot).platform != "default" or not any(note.code == "no_wheels" for note in robot.notes):
+    if provenance_of(robot).platform != "default" or not any(
+        note.code == "no_wheels" for note in robot.notes
+    ):
         return Chosen(robot, data, f"{robot.platform.name}, {_origin(robot)}{_why_kept(robot)}")
     if not robot.q_names[robot.platform.n_p :]:
         what = "has neither wheels nor movable joints: there is nothing to lead"

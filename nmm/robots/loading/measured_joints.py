@@ -138,14 +138,14 @@ class Measured:
     def is_named_wheel(self, joint: int) -> bool:
         """Whether its name or its child link's holds "wheel" or, where it can be a wheel's, "caster", or is
         that of a wheel at the left or right, or at a corner: lw, rw_joint, fl, rear_lr. Knees are called so,
-        too: below a leg's joints the short names do not count."""
+        too: below a leg's joints the short names count only where it turns without end."""
         names = " ".join([str(self.model.names[joint]), *self.links.get(joint, ())]).lower()
         if is_named(names, _WHEELS):
             return True
-        rolls = self.why_not_rolling(joint) is None and _SHORT_NAMES.search(names) is not None
-        return rolls and not any(
-            is_revolute(self.model.joints[above]) and not self.is_upright(above) for above in self.above(joint)
-        )
+        if self.why_not_rolling(joint) is not None or _SHORT_NAMES.search(names) is None:
+            return False
+        legs = [one for one in self.above(joint) if is_revolute(self.model.joints[one])]
+        return all(map(self.is_upright, legs)) or not np.isfinite(_ends(self.model, joint)).any()
 
     def carries_wheel_link(self, joint: int) -> bool:
         """Whether a link that is called a wheel is fixed to the joint's body."""
