@@ -76,6 +76,15 @@ def number_text(value: float | None, digits: int = 3) -> str:
     return mantissa.replace("-", "−") + power
 
 
+def apart(value: float, *others: float, digits: int = 4) -> list[str]:
+    """Numbers in as few digits, no fewer than `digits`, as tell the first from the others: 3.0001 from 3."""
+    for count in range(digits, 18):
+        texts = [f"{one:.{count}g}" for one in (value, *others)]
+        if all(text != texts[0] or one == value for text, one in zip(texts, (value, *others), strict=True)):
+            break
+    return texts
+
+
 def measured(value: float, unit: str) -> str:
     """A number of four digits with its unit, an angle in degrees too: "0.3 m", "0.5236 rad (30°)"."""
     return f"{value:.4g} {unit}" + (f" ({degrees(value):.4g}°)" if unit == "rad" else "")

@@ -167,14 +167,6 @@ BAD = {
         robot(LINKS, link("c"), joint(), joint(parent="b", child="c")),
         [("name_twice", {"kind": "joint", "name": "j"})],
     ),
-    **{
-        f"{kind} named {name}": (text, [("name_reserved", {"kind": kind, "name": name})])
-        for name in ("x", "y", "theta", "universe")
-        for kind, text in (
-            ("joint", robot(LINKS, joint(name))),
-            ("link", robot(link("a"), link(name), joint(child=name))),
-        )
-    },
     "no type": (
         robot(LINKS, '<joint name="j"><parent link="a"/><child link="b"/></joint>'),
         [("joint_type_missing", {"joint": "j"})],

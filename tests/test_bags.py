@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import nmm
@@ -63,11 +64,12 @@ def test_every_number_is_the_runs(run: nmm.Trajectory, log: Path, read: Any) -> 
     found, robot = read(log), run.robot
     assert run.believed is not None
     times = [1_700_000_000_000_000_000 + round(t * 1e9) for t in run.t]
-    for topic in ("/joint_states", "/odom", "/tf", "/cmd_vel", "/inputs", "/error"):
+    poses = ("/base_pose", "/end_effector_pose", "/desired_pose")
+    for topic in ("/joint_states", "/odom", "/tf", "/cmd_vel", "/inputs", "/error", *poses):
         assert [time for time, _ in found[topic]] == times, topic
     rows: dict[str, list[Any]] = {topic: [one for _, one in many] for topic, many in found.items()}
     for k, t in enumerate(times):
-        for topic in ("/joint_states", "/odom", "/cmd_vel", "/inputs"):
+        for topic in ("/joint_states", "/odom", "/cmd_vel", "/inputs", *poses):
             at = rows[topic][k].header.stamp
             assert at.sec * 10**9 + at.nanosec == t
     names = rows["/joint_states"][0].name
@@ -96,6 +98,52 @@ def test_every_number_is_the_runs(run: nmm.Trajectory, log: Path, read: Any) -> 
         told = [[p.pose.position.x, p.pose.position.y, p.pose.position.z] for p in path.poses]
         np.testing.assert_array_equal(told, points)
     assert "<robot" in rows["/robot_description"][0].data
+
+
+def test_chunks_are_compressed_as_ros_and_its_viewers_read_them(run: nmm.Trajectory, log: Path) -> None:
+    """By the reader of the package mcap: zstd, and the file a quarter of its messages."""
+    with log.open("rb") as file:
+        opened = pytest.importorskip("mcap.reader").make_reader(file)
+        summary = opened.get_summary()
+        messages = sum(len(message.data) for _, _, message in opened.iter_messages())
+    assert {one.compression for one in summary.chunk_indexes} == {"zstd"}
+    assert sum(one.compressed_size for one in summary.chunk_indexes) < messages / 4
+    assert log.stat().st_size < messages / 2
+
+
+@pytest.mark.parametrize("read", [by_mcap, by_rosbags])
+def test_poses_are_told_alone_too(run: nmm.Trajectory, log: Path, read: Any) -> None:
+    """The base's as in its Odometry, the end-effector's by Pinocchio, the desired path's points."""
+    found = read(log)
+    assert run.frame == "ee"
+    assert run.desired is not None
+    model = run.robot.model
+    data, index = model.createData(), model.getFrameId("ee")
+    for k, (base, odometry) in enumerate(zip(found["/base_pose"], found["/odom"], strict=True)):
+        one, other = base[1].pose, odometry[1].pose.pose
+        assert base[1].header.frame_id == odometry[1].header.frame_id == "odom"
+        assert (one.position.x, one.position.y) == (other.position.x, other.position.y)
+        assert one.orientation.z == pytest.approx(
+            np.copysign(other.orientation.z, one.orientation.z), abs=1e-12
+        )
+        pin.framesForwardKinematics(model, data, run.q[k])
+        reached, wanted = (found[topic][k][1] for topic in ("/end_effector_pose", "/desired_pose"))
+        assert reached.header.frame_id == wanted.header.frame_id == "map"
+        np.testing.assert_allclose(nmm.ros.placement(reached), data.oMf[index].homogeneous, atol=1e-12)
+        np.testing.assert_array_equal(nmm.ros.placement(wanted)[:3, 3], run.desired[k])
+
+
+def test_a_covariance_that_is_not_known_says_so(run: nmm.Trajectory, log: Path) -> None:
+    """By -1 at its beginning, as sensor_msgs/Imu defines it; one that is given is in its place."""
+    for _, one in by_rosbags(log)["/odom"]:
+        for told in (one.pose.covariance, one.twist.covariance):
+            assert told.tolist() == [-1.0] + 35 * [0.0]
+    known = np.array([[0.1, 0.01, 0.02], [0.01, 0.2, 0.03], [0.02, 0.03, 0.3]])
+    made = nmm.ros.Messages(run.robot, STORE.types).odometry(0.0, run.q[0], run.q_dot[0], known)
+    rows = made.pose.covariance.reshape(6, 6)
+    np.testing.assert_array_equal(rows[np.ix_([0, 1, 5], [0, 1, 5])], known)
+    assert np.abs(rows).sum() == np.abs(known).sum()
+    assert made.twist.covariance[0] == -1.0
 
 
 def test_transforms_lead_to_every_link_where_pinocchio_has_it(run: nmm.Trajectory, log: Path) -> None:
@@ -220,7 +268,7 @@ def test_damaged_bags_are_refused_in_a_line(log: Path, tmp_path: Path) -> None:
     robot, whole = nmm.load("unicycle_2r"), log.read_bytes()
     bad = tmp_path / "bad.mcap"
     rng = np.random.default_rng(0)
-    for content in (b"", b"no MCAP", whole[:20], whole[: len(whole) // 2], whole[:-9], whole[:8] * 10):
+    for content in (b"", b"no MCAP", whole[:20], whole[:2000], whole[:8] * 10):
         bad.write_bytes(content)
         with pytest.raises(InputError) as error:
             nmm.read_bag(bad, robot)

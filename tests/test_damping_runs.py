@@ -200,3 +200,39 @@ def test_ej_tells_an_algorithmic_singularity_from_a_kinematic_one() -> None:
     controller = scenario.override("robot.arguments", {"d": 0}).controller()
     across = {"q1": math.pi / 2, "q2": 0.0}
     assert controller.evaluate(0.0, controller.robot.q(across)).status is Status.SINGULAR_J
+
+
+@pytest.mark.parametrize("dt", [0.01, 0.05])
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize(("acceleration", "speed"), [(1.0, None), (3.0, 0.25), ([-1.0, 3.0], None)])
+def test_with_limited_accelerations_an_arm_comes_to_rest_out_of_reach(
+    acceleration: Any, speed: float | None, order: int, dt: float
+) -> None:
+    """Inputs that cannot turn back within a sample swing through, and did so for good (UR5, 1.5 rad/s)."""
+    source = "package://example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
+    robot = nmm.load(source, platform="fixed")
+    task = nmm.Task(nmm.Position("ee_link"), [3.0, 1.0, 0.5], **({} if speed is None else {"speed": speed}))
+    limits = nmm.Limits(acceleration=acceleration)
+    controller = nmm.Controller(robot, task, nmm.DampedLeastSquares(), limits=limits, dt=dt, order=order)
+    run = nmm.simulate(controller, [0.3, -1.2, 1.6, -0.9, -1.4, 0.0], 80.0, dt, "zoh")
+    assert np.abs(run.u[run.t > 70.0]).max() < 1e-3
+    assert "still_moving" not in codes(run)
+    # As near as it can be: no joint brings the hand nearer, Jᵀ e = 0.
+    step = controller.evaluate(80.0, run.q[-1])
+    assert np.abs(step.J.T @ step.error).max() < 1e-3
+
+
+def test_what_damping_remembers_of_overrun_inputs_is_forgotten_by_a_reset() -> None:
+    robot = nmm.load("unicycle_3r", platform="fixed")
+    task = nmm.Task(nmm.Position("ee"), [3.0, -1.0, 0.5])
+    limits = nmm.Limits(acceleration=0.5)
+    controller = nmm.Controller(robot, task, nmm.DampedLeastSquares(), limits=limits, dt=0.01)
+    first, second = (nmm.simulate(controller, {"q2": 0.8, "q3": 0.5}, 10.0, 0.01) for _ in range(2))
+    assert np.array_equal(first.q, second.q)
+    q = first.q[200]
+    before = controller(2.0, q)
+    controller.evaluate(2.0, first.q[50])
+    controller.velocity(2.0, first.q[50])
+    again = nmm.Controller(robot, task, nmm.DampedLeastSquares(), limits=limits, dt=0.01)
+    nmm.simulate(again, {"q2": 0.8, "q3": 0.5}, 10.0, 0.01)
+    assert np.array_equal(again(2.0, q), before)

@@ -51,6 +51,11 @@ def test_the_page_of_scenario_keys_is_the_schemas() -> None:
     assert script("make_scenario_keys").page() == expected, "run python docs/make_scenario_keys.py"
 
 
+def test_the_page_of_file_elements_is_the_tables() -> None:
+    expected = (ROOT / "docs" / "file_elements.md").read_text(encoding="utf-8")
+    assert script("make_file_elements").page() == expected, "run python docs/make_file_elements.py"
+
+
 def test_the_lists_that_follow_from_the_kinds_hold_them_all() -> None:
     lists = script("make_kind_lists")
     texts = {path: path.read_text(encoding="utf-8") for path in (lists.STUB, lists.INDEX)}

@@ -16,7 +16,7 @@ from findings import the, why
 import nmm
 from nmm.cli import runs as commands
 from nmm.diagnosis.judgement import Trials
-from nmm.findings import Finding, loop, run, words
+from nmm.findings import Finding, bag, loop, run, words
 from nmm.findings.run import line
 from nmm.runs.verdict import Awaited
 
@@ -710,4 +710,8 @@ def test_every_code_is_documented(pytestconfig: pytest.Config) -> None:
     first = [
         row.split("|")[1] for row in page.partition("## Of a robot")[0].splitlines() if row.startswith("| `")
     ]
-    assert {code for cell in first for code in re.findall(r"`(\w+)`", cell)} == {*run.WORDS, *loop.WORDS}
+    assert {code for cell in first for code in re.findall(r"`(\w+)`", cell)} == {
+        *run.WORDS,
+        *loop.WORDS,
+        *bag.WORDS,
+    }

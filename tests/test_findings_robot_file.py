@@ -77,7 +77,39 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
         {},
         "expected one robot, found 2 bodies of the world that move: a, b",
     ),
-    "mjcf_left_out": ({"names": ["body table"]}, {}, "left out of the MJCF file: body table"),
+    "mjcf_left_out": (
+        {
+            "names": ["body table", "shape ellipsoid"],
+            "lines": {"body table": 3, "shape ellipsoid": "a.xml:5"},
+        },
+        {"line": 3},
+        "left out of the MJCF file: body table (line 3), shape ellipsoid (a.xml:5)",
+    ),
+    "mjcf_noted": (
+        {"why": "tendons couple no joints", "names": ["<fixed>"], "lines": {"<fixed>": 7}},
+        {"line": 7},
+        "MJCF: <fixed> (line 7): tendons couple no joints",
+    ),
+    "mjcf_keyframe": (
+        {"name": "home", "size": 9, "got": 7},
+        {"line": 4},
+        "keyframe 'home' has 7 numbers as qpos, the robot has 9: left out",
+    ),
+    "mjcf_speeds": (
+        {"limits": {"wheel": 10.0}},
+        {"line": 4},
+        "velocities are limited by what actuators may ask for: wheel 10 (rad/s, m/s)",
+    ),
+    "mjcf_efforts": (
+        {"limits": {"q1": 5.0}},
+        {"line": 4},
+        "efforts are limited by what actuators give: q1 5 (Nm, N)",
+    ),
+    "mjcf_controls": (
+        {"ranges": {"q1": [-1.0, 0.5]}},
+        {"line": 4},
+        "actuators ask for less than the joints' limits, which are kept: q1 from -1 to 0.5",
+    ),
     "xacro_failed": ({"reason": "division by zero"}, {}, "xacro: division by zero"),
     "xacro_argument_missing": (
         {"name": "l1"},
@@ -120,11 +152,6 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     "version_unknown": ({"got": "2.0"}, {"line": 1}, "<robot> version: expected 1.0, 1.1 or 1.2, got '2.0'"),
     "no_links": ({}, {}, "no links (in MJCF: no bodies)"),
     "name_missing": ({"kind": "link"}, {"line": 4}, "a link without a name"),
-    "name_reserved": (
-        {"kind": "joint", "name": "x", "taken_by": "a coordinate"},
-        {"line": 4},
-        "joint 'x': the name is taken by a coordinate",
-    ),
     "name_twice": ({"kind": "link", "name": "c"}, {"line": 4}, "two links named 'c'"),
     "name_unknown": (
         {"kind": "parent link", "got": "uper", "available": ["base", "upper"]},
@@ -369,6 +396,93 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
         {},
         "shapes left out, their meshes are missing: package://p/m.stl",
     ),
+    "turned_twice": (
+        {},
+        {"line": 4, "joint": "j"},
+        "joint 'j': <origin> has both rpy and quat_xyzw, expected one of them",
+    ),
+    "quaternion_zero": (
+        {},
+        {"line": 4, "joint": "j"},
+        "joint 'j': <origin> quat_xyzw is zero: no rotation has it",
+    ),
+    "element_unknown": (
+        {"element": "limt", "inside": "joint", "near": "limit", "count": 3},
+        {"line": 4},
+        "<limt> in <joint> (3 times, first in line 4) is not known and does not count: did you mean limit?",
+    ),
+    "attribute_unknown": (
+        {"element": "axis", "attribute": "rpy", "near": "", "count": 1},
+        {"line": 4},
+        "<axis> rpy (line 4) is not known and does not count",
+    ),
+    "element_unread": (
+        {"element": "loop_joint", "inside": "robot", "why": "the loop stays open", "count": 2},
+        {},
+        "<loop_joint> (2 times) is not read: the loop stays open",
+    ),
+    "attribute_unread": (
+        {"element": "limit", "attribute": "jerk", "why": "jerk is not limited", "count": 1},
+        {"srdf": "a.srdf"},
+        "SRDF a.srdf: <limit> jerk is not read: jerk is not limited",
+    ),
+    "element_again": (
+        {"element": "limit", "inside": "joint", "count": 1},
+        {"line": 4},
+        "a further <limit> in one <joint> (line 4) does not count: the first does",
+    ),
+    "soft_limits": (
+        {"limits": {"j": [-1.5, 2.0]}, "count": 1},
+        {"line": 4},
+        "soft limits of <safety_controller> (line 4) are not kept: j: [-1.5, 2]; they are where given as "
+        "limits of position (Limits(position=...))",
+    ),
+    "limits_of_continuous": (
+        {"names": ["j", "k"], "count": 2},
+        {"line": 4},
+        "<limit> lower and upper (2 times, first in line 4) do not count at continuous joints: j, k",
+    ),
+    "accelerations_of_file": (
+        {"limits": {"j": 3.0, "k": 0.25}},
+        {},
+        "limits of acceleration in the file, which only Limits(acceleration=...) keeps, in scenarios limits: "
+        "acceleration: j: 3, k: 0.25",
+    ),
+    "passive_held": (
+        {"values": {"j": 0.0}},
+        {"srdf": "a.srdf"},
+        "SRDF a.srdf: joints without a motor have no input and are held: j at 0 (lock for another value)",
+    ),
+    "groups_without_inputs": (
+        {"names": ["hand"]},
+        {"srdf": "a.srdf"},
+        "SRDF a.srdf: groups that move by no input: hand",
+    ),
+    "srdf_names_unknown": (
+        {"names": ["lnk", "jnt"]},
+        {"srdf": "a.srdf"},
+        "SRDF a.srdf: no such links, joints or groups: lnk, jnt",
+    ),
+    "virtual_joint_unused": (
+        {"name": "odom", "child": "hand"},
+        {"srdf": "a.srdf"},
+        "SRDF a.srdf: virtual joint odom does not count: hand is not the root link",
+    ),
+    "motion_model_differs": (
+        {"name": "odom", "model": "holonomic", "platform": "unicycle"},
+        {"srdf": "a.srdf"},
+        "SRDF a.srdf: virtual joint odom has motion model holonomic, unlike platform unicycle",
+    ),
+    "posture_of_base": (
+        {"posture": "home", "names": ["px", "py"]},
+        {"srdf": "a.srdf"},
+        "SRDF a.srdf: posture home: in place of px, py are x, y, theta: left out",
+    ),
+    "names_taken": (
+        {"names": {"x": "x_joint", "v": "v_joint"}},
+        {},
+        "renamed, since the platform's coordinates or inputs have these names: x is x_joint, v is v_joint",
+    ),
     "base_of_joints": (
         {"names": ["px", "py", "rz"], "platform": "omnidirectional", "limits": {}},
         {},
@@ -376,6 +490,12 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
             "px, py, rz move the whole robot without limits: a base of joints, in whose place is "
             "platform omnidirectional; platform fixed keeps them as coordinates"
         ),
+    ),
+    "gantry": (
+        {"names": ["along", "across"]},
+        {},
+        "along, across slide all else and nothing turns it: a gantry, on platform fixed; --platform NAME "
+        '(platform="NAME") puts it on another',
     ),
     "arm_mounted": (
         {"name": "ur5", "key": "ur5_2", "frame": "top", "base": "cart", "prefix": "ur5_2_"},

@@ -787,13 +787,6 @@ def test_helical_joint_keeps_its_pitch() -> None:
     np.testing.assert_allclose(data.oMf[loaded.frame_id("odd")].translation, [0.5, 0, 0], atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["x", "theta"])
-def test_names_of_the_coordinates_are_taken(name: str) -> None:
-    with pytest.raises(RobotError) as caught:
-        load(two_joints(pin.JointModelRX(), name))
-    assert caught.value.what.endswith(f" {name}")
-
-
 def test_shapes_on_a_joint_that_is_not_there() -> None:
     large = load(pin.buildModelFromXML(arm_text()))
     text = arm_text()

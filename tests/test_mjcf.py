@@ -131,7 +131,7 @@ def test_a_file_is_put_together_from_others(tmp_path: Path) -> None:
         ),
         (world('<body name="a"><joint type="ball"/></body>'), "name_unknown", {"got": "ball"}),
         (world('<body name="a"><joint class="none"/></body>'), "name_unknown", {"got": "none"}),
-        (world('<body name="a"><joint/><replicate count="3"/></body>'), "mjcf_unread", {}),
+        (world('<body name="a"><joint/><composite type="cable"/></body>'), "mjcf_unread", {}),
         (world("<body><joint/></body>", before='<compiler coordinate="global"/>'), "mjcf_unread", {}),
         (world('<body name="a" pos="0 0"><joint/></body>'), "not_numbers", {"attribute": "pos"}),
         (world('<geom type="plane"/>'), "no_links", {}),

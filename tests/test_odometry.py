@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 import re
 import runpy
+import warnings
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -228,6 +230,83 @@ def test_a_counter_that_jumps_by_a_turn_is_refused() -> None:
     with pytest.raises(InputError, match=names[0]):
         usual.update(dict.fromkeys(names, 0.0), 0.1)
     np.testing.assert_allclose(usual.update(dict.fromkeys(names, 8.4)), odometry.q, atol=1e-12)
+
+
+WHEELS = ("left_wheel_joint", "right_wheel_joint")
+
+
+def rolled(steps: Array, turn: str, start: float = 0.0, dt: float | None = None, **options: Any) -> Array:
+    """q of wheels that turn by steps (N, 2), rad, read as they are, in (-π, π] or in [0, 2π)."""
+    robot = base("differential_base")
+    angles = start + np.vstack([np.zeros(2), np.cumsum(steps, axis=0)])
+    if turn == "half":
+        angles = np.pi - np.remainder(np.pi - angles, 2 * np.pi)
+    elif turn == "whole":
+        angles = np.remainder(angles, 2 * np.pi)
+    readings = [dict(zip(WHEELS, row, strict=True)) for row in angles.tolist()]
+    odometry = robot.odometry(robot.rest, readings[0], **options)
+    for k, now in enumerate(readings[1:], 1):
+        odometry.update(now, None if dt is None else k * dt)
+    return np.asarray(odometry.q)
+
+
+@pytest.mark.parametrize("turn", ["half", "whole"])
+@pytest.mark.parametrize("start", [0.0, 3.14, -2.0])
+@pytest.mark.parametrize("dt", [None, 0.02])
+@pytest.mark.parametrize("options", [{}, {"wrapped": True}, {"wrapped": [*WHEELS]}])
+@pytest.mark.filterwarnings("ignore:.*read within one turn:RuntimeWarning")
+def test_wheels_that_are_read_within_one_turn(
+    turn: str, start: float, dt: float | None, options: dict[str, Any]
+) -> None:
+    """There and back, steps up to 0.5 rad, ahead and on the spot: the way is that by counters."""
+    phase = np.linspace(0.0, 4 * np.pi, 400)
+    steps = np.column_stack([0.5 * np.sin(phase) + 0.02, 0.45 * np.cos(phase)])
+    counted = rolled(steps, "on", dt=dt)
+    np.testing.assert_allclose(rolled(steps, turn, start, dt, **options), counted, atol=1e-9)
+
+
+def test_who_reads_within_one_turn_is_told_once_a_wheel() -> None:
+    steps = np.full((100, 2), 0.2)
+    with pytest.warns(RuntimeWarning, match="within one turn") as heard:
+        rolled(steps, "half")
+    assert len(heard) == 2
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        rolled(steps, "half", wrapped=True)
+        rolled(steps, "on")
+        rolled(-steps, "on")
+
+
+@pytest.mark.parametrize(
+    ("steps", "options", "named"),
+    [
+        ([0.3, 2.6], {"wrapped": True}, "half a turn"),  # 0.83 of half a turn
+        ([0.3, 0.3], {"wrapped": True, "dt": 0.5}, "half a turn"),  # 30 rad/s may have been
+        ([0.1, 0.1, 2.3, 2.3], {}, "wrapped=True"),  # 1.87 → -1.48 or -3.98 the other way
+        ([0.3, 8.0, 0.1], {"wrapped": True, "turn": "on"}, "as wrapped= says"),
+    ],
+)
+def test_turns_that_could_be_others_are_refused_by_name(
+    steps: list[float], options: dict[str, Any], named: str
+) -> None:
+    turned = np.column_stack([steps, np.zeros(len(steps))])
+    with pytest.raises(InputError, match=named) as error:
+        rolled(turned, **{"turn": "half", "start": 1.0, **options})
+    assert WHEELS[0] in str(error.value)
+
+
+def test_wrapped_names_wheels() -> None:
+    robot, zero = base("differential_base"), dict.fromkeys(WHEELS, 0.0)
+    with pytest.raises(InputError, match="wrapped"):
+        robot.odometry(robot.rest, zero, wrapped=["wheel"])
+    one = robot.odometry(robot.rest, zero, wrapped=WHEELS[0])
+    for k in range(1, 60):
+        one.update({WHEELS[0]: math.remainder(0.2 * k, 2 * math.pi), WHEELS[1]: 0.2 * k})
+    np.testing.assert_allclose(one.q, [0.1 * 0.2 * 59, 0, 0], atol=1e-9)
+    far = robot.odometry(robot.rest, zero)  # counters that are read seldom
+    for turned in (6.0, 12.0, 5.0):
+        far.update(dict.fromkeys(WHEELS, turned))
+    np.testing.assert_allclose(far.q, [0.5, 0, 0], atol=1e-9)
 
 
 def test_encoders_by_name_in_any_order() -> None:

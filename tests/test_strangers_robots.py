@@ -104,11 +104,6 @@ def test_no_bundled_wheel_slides(name: str) -> None:
     assert slipping_wheels(nmm.load(name)) == {}
 
 
-def test_a_joint_named_like_an_input_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(nmm.InputError, match=r"joints have the names of inputs of the unicycle platform: v$"):
-        nmm.load(wheeled(tmp_path / "named.urdf", arm="v"))
-
-
 def test_a_steered_wheel_off_its_pivot_is_no_car(tmp_path: Path) -> None:
     parts = [link(name) for name in ("base", "column", "front", "left", "right")]
     parts += [

@@ -34,7 +34,6 @@ def based(*joints: tuple[str, str], end: float = 999999.0, offset: str = "0 0 0"
         ((TURN, AHEAD), "unicycle"),
         ((TURN, AHEAD, TURN), "omnidirectional"),
         ((AHEAD, ASIDE, TURN), "omnidirectional"),
-        ((ASIDE, AHEAD), "omnidirectional"),
     ],
 )
 @pytest.mark.parametrize("end", [1e5, 999999.0, 1e9])
@@ -57,6 +56,38 @@ def test_a_base_of_endless_joints_is_the_platform(
     ahead = next(f"base{i}" for i, one in enumerate(joints) if one == AHEAD)
     there = nmm.Configuration(kept, kept.q({ahead: 0.7, "q1": 0.4})).placement("hand")
     np.testing.assert_allclose(at.homogeneous, there.homogeneous, atol=1e-12)
+
+
+@pytest.mark.parametrize("joints", [(AHEAD, ASIDE, TURN), (ASIDE, AHEAD, TURN), (TURN, AHEAD)])
+def test_a_base_of_joints_turns_where_it_stands(tmp_path: Path, joints: tuple[tuple[str, str], ...]) -> None:
+    """A first joint that is away from the root link and turned: against the file's own joints."""
+    place = '<origin xyz="1 0.5 0.1" rpy="0 0 0.7"/>'
+    text = based(*joints).replace('<origin xyz="0 0 0"/>', place, 1)
+    path = write(tmp_path / "placed.urdf", text)
+    loaded, kept = nmm.load(path), nmm.load(path, platform="fixed")
+    turn = f"base{joints.index(TURN)}"
+    at = nmm.Configuration(loaded, loaded.q({"theta": np.pi / 2, "q1": 0.4}))
+    there = nmm.Configuration(kept, kept.q({turn: np.pi / 2, "q1": 0.4}))
+    for frame in ("hand", f"b{len(joints) - 1}"):
+        expected = there.placement(frame).homogeneous
+        np.testing.assert_allclose(at.placement(frame).homogeneous, expected, atol=1e-12)
+    ahead = nmm.Configuration(loaded, loaded.q({"x": 0.3})).placement("hand")
+    slid = nmm.Configuration(kept, kept.q({f"base{joints.index(AHEAD)}": 0.3})).placement("hand")
+    np.testing.assert_allclose(ahead.homogeneous, slid.homogeneous, atol=1e-12)
+
+
+@pytest.mark.parametrize("end", [0.3, 20.0, 999999.0])
+@pytest.mark.parametrize("joints", [(AHEAD, ASIDE), (ASIDE, AHEAD), (AHEAD, ("prismatic", "1 1 0"))])
+def test_two_slides_without_a_turn_are_a_gantry(
+    tmp_path: Path, joints: tuple[tuple[str, str], ...], end: float
+) -> None:
+    path = write(tmp_path / "gantry.urdf", based(*joints, end=end, offset="0.1 0 0.2"))
+    loaded = nmm.load(path)
+    assert (loaded.platform.name, loaded.q_names) == ("fixed", ("base0", "base1", "q1"))
+    assert_found(of_code(loaded.notes, "gantry"), ("gantry", {"names": ["base0", "base1"]}))
+    assert nmm.load(path, platform="unicycle").q_names[:3] == ("x", "y", "theta")
+    draft = nmm.first_scenario(path, file=tmp_path / "first.yaml")
+    assert draft.trajectory.robot.platform.name == "fixed"
 
 
 @pytest.mark.parametrize("end", [0.6, 20.0])

@@ -25,7 +25,7 @@ class Follow:
 
     def on_joint_state(self, message):
         if self.states.add(message):  # which may have further joints, or a part of them
-            base = self.frames.base("map", self.messages.base)
+            base = self.frames.base("map", self.robot)  # its reference point, by any link fixed to it
             self.q = self.robot.q_from(self.states.joints, base, near=self.q)
             self.measured = self.states.stamp
 

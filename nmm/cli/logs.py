@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import os
+import warnings
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from nmm.cli.groups import command
 from nmm.cli.interrupts import shielded
-from nmm.cli.options import flag, option
-from nmm.cli.output import OK, show_table, show_text
+from nmm.cli.options import flag, names_of, option
+from nmm.cli.output import OK, show_table, show_text, warn
 from nmm.errors import InputError
 
 
@@ -26,13 +29,14 @@ def export(
 ) -> int:
     """Write a run as a log that Foxglove, Rerun and ROS 2's tools open.
 
-    Joint states, TF, odometry, twist, inputs, task error, paths, events, the robot's description
+    Joint states, TF, odometry, poses, twist, inputs, task error, paths, events, the robot's description
     (docs/ros.md). Needs pip install rosbags.
 
     \b
     nmm export runs/unicycle_2r_position-rg --mcap
     nmm export runs/unicycle_2r_position-rg --mcap here.mcap --start 1700000000
     """
+    from nmm.ros.description import packaged
     from nmm.runs.trajectory import Trajectory
 
     if not mcap:
@@ -42,10 +46,51 @@ def export(
     with shielded():
         run.save_mcap(path, start)
     show_text(f"written: {path}")
+    if folders := dict.fromkeys(folder for folder, _ in packaged(run.robot).values()):
+        show_text(f"its meshes are found with ROS_PACKAGE_PATH={os.pathsep.join(folders)}")
     return OK
 
 
-def compare_with_bag(source: str, bag: Path, out: Path | None) -> int:
+@dataclass(frozen=True)
+class OfBag:
+    """Where a robot's messages are in a log, and what its frames are called."""
+
+    joints: str | None = option("TOPIC,...", "Joint states of the robot's log.", show="joint_states")
+    odometry: str | None = option("TOPIC", "Its odometry.", show="odom")
+    tf: str | None = option("TOPIC", "Its transforms; with _static behind, those that are static.", show="tf")
+    map_frame: str | None = option("FRAME", "The frame in which a localisation works.", "--map", show="map")
+    odom_frame: str | None = option("FRAME", "The frame of its odometry in TF.", "--odom", show="odom")
+    base: str | None = option(
+        "FRAME", "A frame of its platform.", show="any that the robot's file has fixed to the platform"
+    )
+    namespace: str | None = option(
+        "NAME", "The namespace of its topics, of those without a slash in front.", show="none"
+    )
+    prefix: str | None = option(
+        "TEXT", "What the names of its frames begin with: robot1/", show="the namespace, where frames have it"
+    )
+
+    def keywords(self) -> dict[str, Any]:
+        """As `nmm.read_bag` takes them, without those not given."""
+        told = {
+            "joints": None if self.joints is None else names_of(self.joints, "--joints"),
+            "odometry": self.odometry,
+            "tf": self.tf,
+            "map": self.map_frame,
+            "odom": self.odom_frame,
+            "base": self.base,
+            "namespace": self.namespace,
+            "prefix": self.prefix,
+        }
+        return {name: value for name, value in told.items() if value is not None}
+
+    def refuse(self) -> None:
+        """`InputError` where there is no log that they are of."""
+        if asked := [*self.keywords()]:
+            raise InputError("there is no log: nmm compare RUN BAG", where=f"--{asked[0]}")
+
+
+def compare_with_bag(source: str, bag: Path, out: Path | None, names: OfBag) -> int:
     """Tell how far a bag's motion is from a run's, and write both as a comparison."""
     from nmm.folders import comparison
     from nmm.folders.whole import check_folder
@@ -56,7 +101,11 @@ def compare_with_bag(source: str, bag: Path, out: Path | None) -> int:
     run = Trajectory.load(source)
     folder = out or Path("runs") / f"{Path(source).resolve().name}-compare"
     check_folder(folder, comparison.is_comparison)
-    measured = read_bag(bag, run.robot, frame=run.frame)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # each is one of the trajectory's, too
+        measured = read_bag(bag, run.robot, frame=run.frame, **names.keywords())
+    for warning in measured.warnings:
+        warn(f"{bag.name}: {warning}")
     found = difference(run, measured)
     with shielded():
         comparison.save([run, measured], folder, f"{run.robot.name}: {run.called} and {bag.name}")

@@ -13,7 +13,7 @@ import typer
 
 from nmm.cli.groups import Browser, Ellipsoids, Figures, OfRobot, command
 from nmm.cli.interrupts import shielded
-from nmm.cli.logs import compare_with_bag
+from nmm.cli.logs import OfBag, compare_with_bag
 from nmm.cli.options import (
     LIMITS,
     Chosen,
@@ -145,6 +145,7 @@ def compare(
     settings: SetOption = None,
     limits: bool | None = LIMITS,
     of_robot: OfRobot,
+    of_bag: OfBag,
     out: Annotated[Path | None, out_option("runs/<scenario>-compare")] = None,
     html: Annotated[bool, typer.Option("--html", hidden=True, callback=_always_written)] = False,
     table: TableOption = None,
@@ -154,8 +155,8 @@ def compare(
     """Run a scenario with several resolvers, or with one at several settings.
 
     One table, one figure, one playback. A scenario with a plan is run with it, and with each resolver
-    without it. With a rosbag2 folder, .mcap or .db3 after a run's folder: how far the robot's motion in this
-    log is from the run.
+    without it. With a rosbag2 folder, .mcap, .db3 or .bag after a run's folder: how far the robot's motion
+    in this log is from the run; its topics and frames are options.
 
     \b
     nmm compare unicycle_2r_position
@@ -164,6 +165,7 @@ def compare(
     nmm compare unicycle_2r_position --table latex > table.tex
     nmm compare unicycle_2r_position --resolvers rg,my_laws.py:law
     nmm compare runs/unicycle_2r_position-rg on_the_robot.mcap
+    nmm compare runs/unicycle_2r_position-rg fleet.mcap --namespace robot1 --odometry odometry/filtered
 
     The folder holds comparison.png, playback.html (all robots in one scene), summary.json and, for each
     resolver, a folder with its run.
@@ -175,7 +177,8 @@ def compare(
     if str(bag).partition(":")[0] in RESOLVERS and resolvers.endswith(","):
         raise InputError(f"no blanks in --resolvers {resolvers}{bag}")
     if bag is not None:
-        return compare_with_bag(scenario, bag, out)
+        return compare_with_bag(scenario, bag, out, of_bag)
+    of_bag.refuse()
     several = [chosen(text, "--resolvers") for text in named(resolvers, "--resolvers")]
     changed = settings_of(settings)
     drawn: dict[str, Any] = {"ellipsoids": ellipsoids.wanted(), "figures": figures.options()}

@@ -17,6 +17,7 @@ from nmm.collisions.queries import Queries
 from nmm.collisions.shapes import HalfSpace
 from nmm.errors import InputError, RobotError, few
 from nmm.robots.loading.srdf import read_srdf
+from nmm.robots.loading.srdf_fitting import disabled_pairs
 from nmm.robots.robot import Robot
 
 #: A robot does not stand on, but is inside, an obstacle that contains every shape at least this deep, m.
@@ -114,7 +115,7 @@ def set_up(
     if srdf is True and not robot.semantics.files:
         raise InputError(f"none is beside the file of {robot.name}", where="srdf", expected="a path")
     if srdf:
-        all_disabled = robot.semantics.disabled if srdf is True else read_srdf(srdf).disabled
+        all_disabled = robot.semantics.disabled if srdf is True else disabled_pairs(read_srdf(srdf), robot)
         disabled = [pair for pair in all_disabled if all(any(one in n for n in known) for one in pair)]
         found = named_pairs(disabled, known, "srdf") & {*wanted}
         touch = touching(robot, shapes, sorted(found), 0.0)

@@ -36,7 +36,7 @@ class SweptMotion(NamedTuple):
     """L looks ahead.
 
     joints, inputs : the robot's
-    deceleration (m,) : by how much inputs can change per second; infinite where unknown
+    falling, rising (m,) : by how much inputs can fall and rise per second; infinite where unknown
     driven (m,), lasts () : inputs to which those of the sample then change, for so long, s, before braking
     carrier (G,), place (G, 12) : a shape's joint, and its place there; an obstacle's is in the world, now
     path (G,), paths (..., L, 12) : the path of an obstacle, -1 without, and -2 for the robot's shapes; places
@@ -51,7 +51,8 @@ class SweptMotion(NamedTuple):
 
     joints: Joints
     inputs: Inputs
-    deceleration: Vector
+    falling: Vector
+    rising: Vector
     driven: Vector
     lasts: Cell
     carrier: IntegerVector
@@ -70,11 +71,12 @@ class SweptMotion(NamedTuple):
 
 
 @compiled
-def braking_share(deceleration: Array, u: Array, dt: float) -> float:
+def braking_share(falling: Array, rising: Array, u: Array, dt: float) -> float:
     """The share of the inputs that one sample of braking removes, equal for all: directions are kept."""
     share = 1.0
     for j in range(u.shape[0]):
-        share = min(share, deceleration[j] * dt / max(abs(u[j]), 1e-12))
+        braking = falling[j] if u[j] > 0.0 else rising[j]
+        share = min(share, braking * dt / max(abs(u[j]), 1e-12))
     return share
 
 
@@ -86,7 +88,7 @@ def lay(way_blocks: Blocks, q: Array, u: Array, dt: float) -> int:
     brakes = False
     for j in range(u.shape[0]):
         size += abs(u[j])
-        brakes = brakes or math.isfinite(way.deceleration[j])
+        brakes = brakes or math.isfinite(way.falling[j]) or math.isfinite(way.rising[j])
     count = max(2, math.ceil(min(dt * size / APART, float(LOOKS))))
     for i in range(count):
         way.after[i] = way.weight[i] = dt * (i + 1) / count
@@ -100,8 +102,7 @@ def lay(way_blocks: Blocks, q: Array, u: Array, dt: float) -> int:
     for _ in range(min(DRIVEN, round(float(way.lasts[()]) / dt))):
         size = 0.0
         for j in range(u.shape[0]):
-            change = way.deceleration[j] * dt
-            now[j] += min(max(way.driven[j] - now[j], -change), change)
+            now[j] += min(max(way.driven[j] - now[j], -way.falling[j] * dt), way.rising[j] * dt)
             size += abs(now[j])
         hold(way.inputs, here, now, dt, ahead)
         copied(ahead, here)
@@ -113,7 +114,7 @@ def lay(way_blocks: Blocks, q: Array, u: Array, dt: float) -> int:
             copied(here, way.q[count])
             count += 1
             gone = 0.0
-    step = braking_share(way.deceleration, now, dt)
+    step = braking_share(way.falling, way.rising, now, dt)
     for _ in range(BRAKING if brakes else 0):
         share -= step
         last = share <= 0.0
@@ -282,7 +283,7 @@ def list_risky(
         for i in range(way.carrier.shape[0]):
             if way.path[i] == -1:
                 copied(places[i], way.place[i])
-    time = dt + 0.5 * dt / braking_share(way.deceleration, u, dt)
+    time = dt + 0.5 * dt / braking_share(way.falling, way.rising, u, dt)
     count, n = scene.supports.shape
     moved, total = scratch((count, n)), scratch(count)
     for i in range(count):

@@ -24,7 +24,7 @@ _BOTH = (BLOCKS, BLOCKS)
 _LIST = types.int64(*_BOTH, _STRIDED, _STRIDED, _STRIDED, _FLAT, _FLAT, *(types.float64,) * 3, types.int64)
 _LAY = types.int64(BLOCKS, _FLAT, _FLAT, types.float64)
 _UNSURE = types.int64(*_BOTH, *(types.int64,) * 3)
-_SHARE = types.float64(_FLAT, _FLAT, types.float64)
+_SHARE = types.float64(_FLAT, _FLAT, _FLAT, types.float64)
 _RENEW = types.void(*_BOTH, _STRIDED, _STRIDED, types.int64)
 
 
@@ -40,17 +40,18 @@ class Short(NamedTuple):
 
 class SweptCheck:
     """Look-ahead for one robot among obstacles; `distance` to keep, and `target` in motion, m; obstacles with
-    a path are looked at for `horizon` s."""
+    a path are looked at for `horizon` s. `changes` : by how much inputs can fall and rise per second, (2, m),
+    or both alike, (m,)."""
 
     def __init__(
-        self, queries: Queries, deceleration: Array, distance: float, target: float, horizon: float = 0.0
+        self, queries: Queries, changes: Array, distance: float, target: float, horizon: float = 0.0
     ) -> None:
         self._queries, self._distance, self._target = queries, distance, target
         self._paths = [one for _, one in queries.moving if one.moves]
         count = max(2, round(horizon / EVERY)) if self._paths and horizon else 0
         self._first: int | None = None
         memory = Memory()
-        memory.add(_way(queries, deceleration, count))
+        memory.add(_way(queries, changes, count))
         self._blocks = memory.blocks()
         self._way = views(SweptMotion, *self._blocks, 0)
         self._both = queries.blocks, self._blocks
@@ -83,7 +84,7 @@ class SweptCheck:
         return len(self._way.later) > 0
 
     def slower(self, u: Array, dt: float) -> float:
-        return float(self._share(self._way.deceleration, u, dt))
+        return float(self._share(self._way.falling, self._way.rising, u, dt))
 
     def list_risky(self, q_dot: Array, u: Array, dt: float, anew: bool) -> int:
         """Count the pairs that could come too near before the robot stands; `anew` forgets earlier ones."""
@@ -164,10 +165,11 @@ class SweptCheck:
                 ahead.paths[path, stands:looks] = ahead.grid[path, known - (looks - stands) :]
 
 
-def _way(queries: Queries, deceleration: Array, standing: int) -> SweptMotion:
+def _way(queries: Queries, changes: Array, standing: int) -> SweptMotion:
     objects, robot = queries.shapes.geometryObjects, queries.robot
     scene, L = queries.scene, LOOKS + DRIVEN + BRAKING + 1 + standing
     turned = robot.joint_axes
+    falling, rising = np.array(np.broadcast_to(changes, (2, robot.n_u)))
     carrier = np.array([shape.parentJoint for shape in objects], dtype=np.int64)
     path = np.full(len(objects), -2)
     moving = 0
@@ -181,7 +183,8 @@ def _way(queries: Queries, deceleration: Array, standing: int) -> SweptMotion:
     return SweptMotion(
         joints=robot.joints,
         inputs=inputs_of(robot),
-        deceleration=deceleration,
+        falling=falling,
+        rising=rising,
         driven=np.zeros(robot.n_u),
         lasts=np.array(0.0),
         carrier=carrier,

@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 
 from nmm.arrays import Array, Integers
-from nmm.control.bounds import OFF, approach, bound_inputs, counted_on, wheel_rows
+from nmm.control.bounds import OFF, approach, bound_inputs, brakings, wheel_rows
 from nmm.control.equations import (
     BOUNDS,
     STEP,
@@ -182,11 +182,11 @@ def write_next_limits(q: Array, integers: Integers, floats: Array) -> None:
         row = limits.rows[i]
         times_S(b.value_q, row, b.G, e.arm, problem.limit_rows[w + i])
         slope = problem.limit_rows[w + i]
-        braking = counted_on(limits.braking[i], slope, limits.acceleration)
+        above, below = brakings(limits, i, slope)
         value, recovery = b.value[row], limits.recovery[()]
         halfway = value + 0.5 * dt * (b.value_t[row] + dot(slope, u))
-        problem.upper[w + i] = approach(limits.row_high[i] - halfway, dt, braking, recovery) - b.value_t[row]
-        problem.lower[w + i] = -approach(halfway - limits.row_low[i], dt, braking, recovery) - b.value_t[row]
+        problem.upper[w + i] = approach(limits.row_high[i] - halfway, dt, above, recovery) - b.value_t[row]
+        problem.lower[w + i] = -approach(halfway - limits.row_low[i], dt, below, recovery) - b.value_t[row]
     for i in range(w + limits.rows.shape[0]):
         turned, now = dt * own.D[drift + i], dot(problem.limit_rows[i], u)
         problem.upper[i] = now + (problem.upper[i] - turned - now) / share

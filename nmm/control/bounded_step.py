@@ -62,4 +62,4 @@ def write_clearance(q: Array, integers: Integers, floats: Array) -> None:
             clear(row)
     if e.limits.mode[()] == SAMPLE:
         bound_unlimited(e.limits, e.problem)
-        clearance_bounds(e.clearance, e.near, e.limits.acceleration, e.problem)
+        clearance_bounds(e.clearance, e.near, e.limits, e.problem)

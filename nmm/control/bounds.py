@@ -44,7 +44,7 @@ FARTHEST = 0.1
 class LimitNumbers(NamedTuple):
     """Limits of m inputs, w wheels and f functions; infinite for none.
 
-    slowest, fastest, acceleration (m,) : of the inputs
+    slowest, fastest (m,) : of the inputs; falling, rising (m,) : how fast they may fall and rise, per second
     coordinate (m,) : the coordinate whose rate an input is, -1 for none; low, high (m,) : its limits
     recovery () : speed of the return from beyond a limit, m/s or rad/s
     wheels (w, 9) : see `nmm.robots.wheel_rates`; spin (w,) : the wheels' largest rates, rad/s
@@ -56,7 +56,8 @@ class LimitNumbers(NamedTuple):
 
     slowest: Vector
     fastest: Vector
-    acceleration: Vector
+    falling: Vector
+    rising: Vector
     coordinate: IntegerVector
     low: Vector
     high: Vector
@@ -100,22 +101,21 @@ def bound_inputs(limits: LimitNumbers, q: Array, problem: ProblemArrays) -> None
         elapsed = dt
     for j in range(limits.slowest.shape[0]):
         lower, upper = limits.slowest[j], limits.fastest[j]
-        A = limits.acceleration[j]
         i = limits.coordinate[j]
         low, high = -math.inf, math.inf
         if i >= 0:
             recovery = limits.recovery[()]
-            high = approach(limits.high[j] - q[i], dt, A, recovery, max(upper, 0.0))
-            low = -approach(q[i] - limits.low[j], dt, A, recovery, max(-lower, 0.0))
+            high = approach(limits.high[j] - q[i], dt, limits.falling[j], recovery, max(upper, 0.0))
+            low = -approach(q[i] - limits.low[j], dt, limits.rising[j], recovery, max(-lower, 0.0))
             # The return obeys the velocity limits, and is slow enough to brake at the opposite limit.
             if high < 0.0:
                 high = max(high, min(lower, 0.0), low)
             if low > 0.0:
                 low = min(low, max(upper, 0.0), high)
             lower, upper = min(max(lower, low), high), max(min(upper, high), low)
-        if not math.isinf(A):
-            change = A * elapsed
-            least, most = problem.before[j] - change, problem.before[j] + change
+        if not (math.isinf(limits.falling[j]) and math.isinf(limits.rising[j])):
+            least = problem.before[j] - limits.falling[j] * elapsed
+            most = problem.before[j] + limits.rising[j] * elapsed
             if least > upper:
                 lower, upper = least, least
             elif most < lower:
@@ -130,13 +130,13 @@ def bound_inputs(limits: LimitNumbers, q: Array, problem: ProblemArrays) -> None
 @compiled
 def gathers_speed(limits: LimitNumbers, problem: ProblemArrays, u: Array, count: int) -> bool:
     """Whether one of the first `count` inputs speeds up, held back by its limit of acceleration alone: then
-    its bounds are twice the largest change apart."""
+    its bounds are the largest fall and rise apart."""
     for j in range(count):
-        change = limits.acceleration[j] * problem.dt[()]
+        change = (limits.falling[j] + limits.rising[j]) * problem.dt[()]
         lower, upper = problem.u_lower[j], problem.u_upper[j]
-        alone = not math.isinf(change) and upper - lower >= 2.0 * change * (1.0 - ROUNDING)
+        alone = not math.isinf(change) and upper - lower >= change * (1.0 - ROUNDING)
         fastest = upper if u[j] > 0.0 else -lower
-        if alone and abs(u[j]) >= fastest - ROUNDING * change:
+        if alone and abs(u[j]) >= fastest - 0.5 * ROUNDING * change:
             return True
     return False
 
@@ -158,15 +158,24 @@ def wheel_rows(limits: LimitNumbers, q: Array, G: Array, problem: ProblemArrays)
 
 
 @compiled
-def counted_on(braking: float, row: Array, acceleration: Array) -> float:
-    """The deceleration of a row's value (m,) to rely on: as given, or a share of what the inputs' give."""
+def counted_on(braking: float, row: Array, side: int, falling: Array, rising: Array) -> float:
+    """The deceleration of a row's value towards its limit at a side, to rely on: as given, or a share of what
+    the inputs' give along the row (m,)."""
     if not math.isnan(braking):
         return braking
     total = 0.0
     for j in range(row.shape[0]):
         if row[j] != 0.0:
-            total += COUNTED_ON * abs(row[j]) * acceleration[j]
+            falls = (row[j] > 0.0) == (side == UPPER)
+            total += COUNTED_ON * abs(row[j]) * (falling[j] if falls else rising[j])
     return total
+
+
+@compiled
+def brakings(limits: LimitNumbers, i: int, row: Array) -> tuple[float, float]:
+    """`counted_on` of function i at its upper and its lower limit."""
+    above = counted_on(limits.braking[i], row, UPPER, limits.falling, limits.rising)
+    return above, counted_on(limits.braking[i], row, LOWER, limits.falling, limits.rising)
 
 
 @compiled
@@ -176,10 +185,10 @@ def function_bounds(limits: LimitNumbers, value: Array, value_t: Array, problem:
     w = limits.spin.shape[0]
     for i in range(limits.rows.shape[0]):
         row = limits.rows[i]
-        braking = counted_on(limits.braking[i], problem.limit_rows[w + i], limits.acceleration)
         recovery = limits.recovery[()]
-        problem.upper[w + i] = approach(limits.row_high[i] - value[row], dt, braking, recovery) - value_t[row]
-        problem.lower[w + i] = -approach(value[row] - limits.row_low[i], dt, braking, recovery) - value_t[row]
+        above, below = brakings(limits, i, problem.limit_rows[w + i])
+        problem.upper[w + i] = approach(limits.row_high[i] - value[row], dt, above, recovery) - value_t[row]
+        problem.lower[w + i] = -approach(value[row] - limits.row_low[i], dt, below, recovery) - value_t[row]
 
 
 class Clearance(NamedTuple):
@@ -217,7 +226,7 @@ def bound_unlimited(limits: LimitNumbers, problem: ProblemArrays) -> None:
 
 
 @compiled
-def clearance_bounds(keep: Clearance, near: Rows, acceleration: Array, problem: ProblemArrays) -> None:
+def clearance_bounds(keep: Clearance, near: Rows, limits: LimitNumbers, problem: ProblemArrays) -> None:
     dt = problem.dt[()]
     for k in range(near.d.shape[0]):
         row = keep.first[()] + k
@@ -227,7 +236,7 @@ def clearance_bounds(keep: Clearance, near: Rows, acceleration: Array, problem: 
         if keep.least[k] > -math.inf:
             problem.lower[row] = keep.least[k] - near.d_t[k]
             continue
-        braking = counted_on(keep.braking[()], problem.limit_rows[row], acceleration)
+        braking = counted_on(keep.braking[()], problem.limit_rows[row], LOWER, limits.falling, limits.rising)
         room = near.d[k] - keep.distance[()]
         speed = keep.gain[()] * (room - keep.margin[()])  # within the margin the return may be slow
         if room < 0.0:

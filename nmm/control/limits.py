@@ -33,7 +33,8 @@ class Limits:
     velocity : of inputs, m/s, rad/s: True for the robot's, False for none, or others by input, group
         ("platform", "arm") or mimic joint: a number for both signs or [lower, upper]
     position : of coordinates, in the same way: [lower, upper]; m, rad
-    acceleration : of inputs, m/s², rad/s²: a number for all, or by input or group; None for none
+    acceleration : of inputs, m/s², rad/s²: a number for both signs or [lower, upper] of what an input changes
+        by per second; for all, or by input or group; None for none
     wheels : largest rolling rates, rad/s: by joint, or one for all but casters; None for the robot's, unless
         velocity=False
     bounds : limits of functions
@@ -43,7 +44,8 @@ class Limits:
 
     Raises
     ------
-    InputError : lower above upper, an acceleration or a recovery that is not above 0, no numbers
+    InputError : lower above upper, an acceleration that does not let inputs both fall and rise, a recovery
+        that is not above 0, no numbers
 
     Examples
     --------
@@ -60,14 +62,14 @@ class Limits:
         self,
         velocity: Named = True,
         position: Named = True,
-        acceleration: float | Mapping[str, float] | None = None,
+        acceleration: Range | Mapping[str, Range] | None = None,
         wheels: float | Mapping[str, float] | None = None,
         bounds: Sequence[Bound] | Bound = (),
         recovery: float = RECOVERY,
     ) -> None:
         self.velocity = _named(velocity, "velocity")
         self.position = _named(position, "position")
-        self.acceleration = _sizes(acceleration, "acceleration")
+        self.acceleration = _changes(acceleration)
         self.wheels = _sizes(wheels, "wheels")
         self.bounds: tuple[Bound, ...] = one_or_several(bounds, Bound, "bounds", "a Bound, or several")
         self.recovery = positive(recovery, "recovery")
@@ -83,7 +85,9 @@ class LimitsOn:
     Attributes
     ----------
     inputs (m, 2), coordinates (n, 2) : lower and upper limits; infinite for none
-    accelerations (m,) : largest change of inputs per second
+    changes (m, 2) : how fast inputs may fall (below 0) and rise per second; infinite for none
+    accelerations (m,) : the size of the smaller of both
+    bounded : names of coordinates with limits
     functions : whose values are limited; braking (f,) : of their components
     wheels (w, 9), spin (w,) : rows of `nmm.robots.wheel_rates`, and the wheels' largest rates, the first of
         `rows`, rad/s
@@ -96,7 +100,10 @@ class LimitsOn:
     def __init__(self, limits: Limits, robot: Robot) -> None:
         self.inputs = _velocities(limits.velocity, robot)
         self.coordinates = _positions(limits.position, robot)
-        self.accelerations = _per_input(limits.acceleration, robot, "acceleration")
+        ends = zip(robot.q_names, self.coordinates, strict=True)
+        self.bounded = tuple(name for name, one in ends if np.any(np.isfinite(one)))
+        self.changes = _changes_on(limits.acceleration, robot)
+        self.accelerations = np.abs(self.changes).min(axis=1)
         self.recovery = limits.recovery
         self._moved = robot.rate_coordinates
         wheels, self.wheels, self.spin = _wheel_limits(limits, robot)
@@ -135,9 +142,12 @@ class LimitsOn:
         positions = self.coordinates[np.maximum(self._moved, 0)]
         positions[self._moved < 0] = [-np.inf, np.inf]
         return LimitNumbers(
-            *(self.inputs[:, 0].copy(), self.inputs[:, 1].copy(), self.accelerations, self._moved),
+            *(self.inputs[:, 0].copy(), self.inputs[:, 1].copy()),
+            *(-self.changes[:, 0], self.changes[:, 1].copy()),
+            self._moved,
             *(positions[:, 0].copy(), positions[:, 1].copy(), np.array(self.recovery)),
-            *(self.wheels, self.spin, np.array(rows, dtype=np.int64)),
+            *(self.wheels, self.spin),
+            np.array(rows, dtype=np.int64),
             *(self._ends[:, 0].copy(), self._ends[:, 1].copy(), self.braking),
             elapsed=np.array(np.nan),
             mode=np.array(SAMPLE, dtype=np.int64),
@@ -181,12 +191,13 @@ def _positions(given: Named, robot: Robot) -> Array:
     return np.asarray(limits)
 
 
-def _per_input(given: float | Mapping[str, float] | None, robot: Robot, what: str) -> Array:
-    if not isinstance(given, Mapping):
-        return np.full(robot.n_u, np.inf if given is None else given)
-    found = np.full(robot.n_u, np.inf)
-    for name, inputs in _inputs(given, robot, what):
-        found[inputs] = given[name]
+def _changes_on(given: Range | Mapping[str, Range] | None, robot: Robot) -> Array:
+    found = _none(robot.n_u)
+    if isinstance(given, Mapping):
+        for name, inputs in _inputs(given, robot, "acceleration"):
+            found[inputs] = _change(given[name], name)
+    elif given is not None:
+        found[:] = _change(given, "acceleration")
     return found
 
 
@@ -250,6 +261,28 @@ def _named(value: Named, name: str) -> Named:
     for key, item in value.items():
         _ends(item, f"{name}: {key}", symmetric=name == "velocity")
     return dict(value)
+
+
+def _changes(value: Range | Mapping[str, Range] | None) -> Range | Mapping[str, Range] | None:
+    if isinstance(value, Mapping):
+        found = {key: _change(item, f"acceleration: {key}") for key, item in value.items()}
+        return {key: _as_given(*ends) for key, ends in found.items()}
+    return None if value is None else _as_given(*_change(value, "acceleration"))
+
+
+def _change(value: Range, name: str) -> tuple[float, float]:
+    """Bounds of an input's change per second; it can fall and rise, as it could not come back otherwise."""
+    if isinstance(value, bool) or np.ndim(value) == 0:
+        size = positive(value, name)
+        return -size, size
+    lower, upper = _ends(value, name, symmetric=True)
+    if not lower < 0.0 < upper:
+        raise InputError(where=name, expected="a number above 0 or [lower, upper] about 0", got=value)
+    return lower, upper
+
+
+def _as_given(lower: float, upper: float) -> Range:
+    return upper if lower == -upper else [lower, upper]
 
 
 def _sizes(value: float | Mapping[str, float] | None, name: str) -> float | Mapping[str, float] | None:

@@ -186,7 +186,7 @@ class RetreatState:
         robot, retreat = self._robot, self._retreat
         p = robot.platform.p
         u = np.zeros(robot.n_u)
-        u[p:] = retreat.gain * (self._home - q)[robot.arm_coordinates]
+        u[p:] = retreat.gain * robot.short_way(self._home - q)[robot.arm_coordinates]
         if self.count % BACKWARDS:
             u[:p] = self._task_alone(problem, p)
         elif p and robot.platform.n_p >= 3:

@@ -66,9 +66,8 @@ class SafetyFilter:
         self._near, self._keep, self._step = step.near, step.clearance, step
         self._program, self._again = program, again
         self._drive = checked_by_caller(drive_inputs, DRIVE)
-        self._lookout = SweptCheck(
-            scene.queries, step.limits.acceleration, scene.distance, scene.distance + SLACK, horizon
-        )
+        changes = np.array([step.limits.falling, step.limits.rising])
+        self._lookout = SweptCheck(scene.queries, changes, scene.distance, scene.distance + SLACK, horizon)
 
     @property
     def counts(self) -> Counts:
@@ -158,7 +157,6 @@ class SafetyFilter:
         how much it falls short, 0 or `least`."""
         problem, limits = self._step.problem, self._step.limits
         dt, p = float(problem.dt), self._scene.robot.platform.p
-        change = limits.acceleration * dt
         self._lookout.list_obstacles()
         stays = np.zeros_like(best)
         longest = self._lookout.contact(t, q, best, dt, stays, 0.0)
@@ -166,7 +164,7 @@ class SafetyFilter:
             driven, sign = stays.copy(), np.array(signs)
             sizes = np.where(sign < 0.0, -limits.slowest[:p], limits.fastest[:p])
             driven[:p] = sign * np.minimum(sizes, UNLIMITED)
-            first = before + np.clip(driven - before, -change, change)
+            first = before + np.clip(driven - before, -dt * limits.falling, dt * limits.rising)
             first = np.clip(first, problem.u_lower, problem.u_upper)
             clear = self._lookout.contact(t, q, first, dt, driven, lasts)
             if clear > longest:

@@ -143,6 +143,8 @@ def lay_out(given: Given, steered: Steered | None) -> LaidOut:
         added_J=np.vstack([np.zeros((len(added_rows), m)), held]),
         added_rate=np.zeros(len(added_rows) + len(held)),
         added_row_scales=np.append(row_scales(added_rows, robot), np.ones(len(held))),
+        falling=-kept.changes[:, 0],
+        rising=kept.changes[:, 1],
         limit_rows=np.zeros((len(kept.rows) + len(near.d), m)),
         limit_levels=[*(task.place(priority) for priority in kept.priorities), *(0 for _ in near.d)],
     )
@@ -156,8 +158,8 @@ def lay_out(given: Given, steered: Steered | None) -> LaidOut:
         ControlStep(
             near=near,
             clearance=_clearance(collisions, len(kept.rows), len(near.d)),
-            task=task_rows(task, robot, first),
-            added=task_rows(added_task, robot, first[len(functions) :]),
+            task=task_rows(task, robot, first, kept.bounded),
+            added=task_rows(added_task, robot, first[len(functions) :], kept.bounded),
             arm=Arm(robot.arm_coordinates, robot.following.table.ravel()),
             terms=np.array(first[objective_at : objective_at + len(objectives)], dtype=np.int64),
             weights=np.array([weight for weight, _ in weighted]),
@@ -176,7 +178,7 @@ def lay_out(given: Given, steered: Steered | None) -> LaidOut:
             q_dot=np.zeros(robot.n),
             retreat=retreat_numbers(given.retreat, robot, rows),
             period=NOT_CALLED,
-            second=_second(given, program, first, differenced) if second else _first(),
+            second=_second(given, program, first, differenced, kept.bounded) if second else _first(),
             step=code.address,
             limits_code=limits_code.address if limited else 0,
             clearance_code=write_clearance.address if len(near.d) else 0,
@@ -189,7 +191,13 @@ def lay_out(given: Given, steered: Steered | None) -> LaidOut:
     return LaidOut(program, step, dimensions, state, kept, weighted, steered)
 
 
-def _second(given: Given, program: Program, first: list[int], differenced: tuple[int, int]) -> SecondOrder:
+def _second(
+    given: Given,
+    program: Program,
+    first: list[int],
+    differenced: tuple[int, int],
+    bounded: tuple[str, ...],
+) -> SecondOrder:
     robot, (rows, functions) = given.robot, differenced
     n, m = robot.n, robot.n_u
     stages, buffers = program.rows_of(functions)
@@ -199,8 +207,8 @@ def _second(given: Given, program: Program, first: list[int], differenced: tuple
         share=np.array(1.0),
         stages=stages,
         buffers=buffers,
-        task=task_rows(given.task, robot, first),
-        added=task_rows(given.added_task, robot, first[len(task_functions(given.task)) :]),
+        task=task_rows(given.task, robot, first, bounded),
+        added=task_rows(given.added_task, robot, first[len(task_functions(given.task)) :], bounded),
         beside=np.zeros(n),
         y=np.zeros((3, rows)),
         D=np.zeros(rows),

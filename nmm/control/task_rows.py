@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -33,10 +33,11 @@ def gain_rows(stack: Stack, robot: Robot) -> tuple[Array, Array, Array, Integers
     return K, speed, braking, group
 
 
-def task_rows(stack: Stack, robot: Robot, first: Sequence[int]) -> TaskRows:
-    """A stack's rows, with zeros for what a step writes; first: where each of `task_functions` begins."""
+def task_rows(stack: Stack, robot: Robot, first: Sequence[int], bounded: Collection[str] = ()) -> TaskRows:
+    """A stack's rows, with zeros for what a step writes; first: where each of `task_functions` begins;
+    bounded: coordinates within limits, which cannot go round."""
     listed = [
-        (first[3 * i] + j, first[3 * i + 1] + j, error_row(task, first[3 * i + 2] + j, row))
+        (first[3 * i] + j, first[3 * i + 1] + j, error_row(task, first[3 * i + 2] + j, row, bounded))
         for i, task in enumerate(stack)
         for j, row in enumerate(task.rows(robot))
     ]
@@ -45,8 +46,8 @@ def task_rows(stack: Stack, robot: Robot, first: Sequence[int]) -> TaskRows:
     return TaskRows(table, K, speed, braking, group, *np.zeros((4, len(table))))
 
 
-def error_row(task: Task, computed: int, row: Row) -> int:
+def error_row(task: Task, computed: int, row: Row, bounded: Collection[str] = ()) -> int:
     """The program's row of a component's error: that of a computed one, else PLAIN or WRAPPED."""
     if task.function.comparison is not None:
         return computed
-    return WRAPPED if row.angular else PLAIN
+    return WRAPPED if row.angular and row.name not in bounded else PLAIN

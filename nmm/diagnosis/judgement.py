@@ -244,12 +244,15 @@ def _unmet(controller: Controller, recorder: Recorder, samples: Samples, dt: flo
     """Findings where inputs fell short of the task, and where the motion differs from its recorded rates."""
     residual = samples.residual.copy()
     if controller.limits is not None:  # of a start from rest λ says it
-        residual[: run_up(samples.t, samples.u, controller.solver.limits_on.accelerations, dt)] = 0.0
+        residual[: run_up(samples.t, samples.u, controller.solver.limits_on.changes, dt)] = 0.0
     unmet = residuals(samples.t, residual, samples.rate)
     if unmet.samples:
         there = {"limits": controller.limits, "distances": controller.solver.scene}
         kept = [name for name, one in there.items() if one is not None]
-        yield unmet.finding(scale=float(recorder.so_far.scale.min(initial=1.0)), kept=kept)
+        more = {"rows": len(controller.rows), "inputs": controller.robot.n_u}
+        if more["rows"] <= more["inputs"] or len(controller.task.levels(controller.robot)) > 1:
+            more = {}
+        yield unmet.finding(scale=float(recorder.so_far.scale.min(initial=1.0)), kept=kept, **more)
     if recorder.disturbed:
         return
     robot, found = controller.robot, recorder.so_far

@@ -10,6 +10,7 @@ from nmm.control.directions import WORLD_PARTS, in_world_axes, lost_directions, 
 from nmm.diagnosis.error_bound import Departure, Samples
 from nmm.findings import Finding
 from nmm.functions.function import Row, row_scales
+from nmm.resolvers.damped_least_squares import C as ROOT
 from nmm.resolvers.damped_least_squares import DampedLeastSquares
 from nmm.robots.configuration import Configuration
 from nmm.robots.reach import Reach, joint_position, reach
@@ -116,7 +117,7 @@ def inputs_fell_short(controller: Controller, samples: Samples, found: Departure
     resolver, J = controller.resolver, samples.J[found.worst]
     values: dict[str, float] = {}
     if isinstance(resolver, DampedLeastSquares):
-        _, _, _, *root = resolver.setup(controller.solver.dimensions).numbers  # α, λ, ε, and C of the weights
+        root = resolver.setup(controller.solver.dimensions).numbers[ROOT:]
         C = np.reshape(root, (-1, J.shape[1]))
         scaled = J / row_scales(controller.rows, controller.robot)[:, np.newaxis]
         sigma = np.linalg.svd(scaled @ C if C.size else scaled, compute_uv=False)[-1]

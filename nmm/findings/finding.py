@@ -12,7 +12,7 @@ from typing import Any
 Words = str | Callable[..., str]
 
 #: The modules beside this one with `WORDS`, a table from code to words, each code in one of them.
-SUBJECTS = ("robot_file", "robot_loading", "run", "loop", "formulas", "singularities", "redundancy")
+SUBJECTS = ("robot_file", "robot_loading", "run", "loop", "formulas", "singularities", "redundancy", "bag")
 
 
 @dataclass(frozen=True)

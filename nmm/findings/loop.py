@@ -3,7 +3,7 @@
 from typing import Any
 
 from nmm.findings.finding import Words
-from nmm.text_format import counted
+from nmm.text_format import apart, counted
 
 _REASONS = {
     "lost": "did not come",
@@ -22,9 +22,11 @@ def _refused(reason: str, samples: int, t: float, end: float) -> str:
 
 
 def _outside(name: str, value: float, unit: str, lower: Any, upper: Any, t: float, **_: Any) -> str:
-    sides = [f"{word} {bound:.4g}" for word, bound in (("from", lower), ("to", upper)) if bound is not None]
+    known = {word: bound for word, bound in (("from", lower), ("to", upper)) if bound is not None}
+    at, *ends = apart(value, *known.values())
+    sides = [f"{word} {end}" for word, end in zip(known, ends, strict=True)]
     return (
-        f"{name} is measured at {value:.4g} {unit}, outside its limits ({' '.join(sides)}), "
+        f"{name} is measured at {at} {unit}, outside its limits ({' '.join(sides)}), "
         f"at t = {t:.4g} s: another unit, or not homed?"
     )
 

@@ -5,7 +5,7 @@ from functools import partial
 
 from nmm.errors import SHOWN, RobotError, few, no_such
 from nmm.findings.finding import Finding, Words
-from nmm.text_format import counted, one_line, quoted, short_words
+from nmm.text_format import apart, counted, one_line, quoted, short_words
 
 _PACKAGE = "package {package!r} not found (give its folder in package_dirs, --package-dir)"
 #: Why there is no mesh, by `cause`.
@@ -78,8 +78,46 @@ def _path(names: Sequence[str]) -> str:
     return " -> ".join(shown)
 
 
+def _lined(names: Sequence[str], lines: Mapping[str, int | str]) -> str:
+    """Names with their lines, or FILE:LINE."""
+    at = {name: f"line {line}" if isinstance(line, int) else line for name, line in lines.items()}
+    return few([f"{name} ({at[name]})" if name in at else name for name in names])
+
+
+def _values(values: Mapping[str, float]) -> str:
+    return few([f"{name} {value:g}" for name, value in values.items()])
+
+
 def _numbers(values: Sequence[float]) -> str:
     return ", ".join(f"{value:.3g}" for value in values)
+
+
+def _times(count: int, given: Mapping[str, object]) -> str:
+    """How often, and where first."""
+    line = f"line {given['line']}" if "line" in given else ""
+    often = f"{count} times{', first in ' if line else ''}" if count > 1 else ""
+    return f" ({often}{line})" if often or line else ""
+
+
+def _unknown(
+    *, element: str, near: str, count: int, inside: str = "", attribute: str = "", **given: object
+) -> str:
+    what = f"<{element}> {attribute}" if attribute else f"<{element}> in <{inside}>"
+    meant = f": did you mean {near}?" if near else ""
+    return f"{what}{_times(count, given)} is not known and does not count{meant}"
+
+
+def _soft_limits(*, limits: Mapping[str, Sequence[float]], count: int, **given: object) -> str:
+    soft = [f"{name}: [{low:g}, {high:g}]" for name, (low, high) in limits.items()]
+    return (
+        f"soft limits of <safety_controller>{_times(count, given)} are not kept: {few(soft)}; they are where "
+        "given as limits of position (Limits(position=...))"
+    )
+
+
+def _unread(*, element: str, why: str, count: int, attribute: str = "", **given: object) -> str:
+    what = f"<{element}> {attribute}" if attribute else f"<{element}>"
+    return f"{what}{_times(count, given)} is not read: {why}"
 
 
 WORDS = placed(
@@ -94,10 +132,30 @@ WORDS = placed(
         "not_robot": "expected <robot> (URDF) or <mujoco> (MJCF) as the root element, got <{got}>",
         "mjcf_unread": "{what} is not understood, so nothing is read",
         "mjcf_included_twice": "included twice",
-        "mjcf_several_trees": lambda *, names, **_: (
+        "mjcf_several_trees": lambda *, names, fused=False, **_: (
             f"expected one robot, found {len(names)} bodies of the world that move: {few(names)}"
+            + (
+                "; if MuJoCo saved it from a URDF: its root link became the world's, which <compiler "
+                'fusestatic="false"/> in the <mujoco> of the URDF prevents'
+                if fused
+                else ""
+            )
         ),
-        "mjcf_left_out": lambda *, names, **_: f"left out of the MJCF file: {few(names)}",
+        "mjcf_left_out": lambda *, names, lines=(), **_: (
+            f"left out of the MJCF file: {_lined(names, dict(lines))}"
+        ),
+        "mjcf_noted": lambda *, why, names, lines, **_: f"MJCF: {_lined(names, lines)}: {why}",
+        "mjcf_keyframe": "keyframe {name!r} has {got} numbers as qpos, the robot has {size}: left out",
+        "mjcf_speeds": lambda *, limits, **_: (
+            f"velocities are limited by what actuators may ask for: {_values(limits)} (rad/s, m/s)"
+        ),
+        "mjcf_efforts": lambda *, limits, **_: (
+            f"efforts are limited by what actuators give: {_values(limits)} (Nm, N)"
+        ),
+        "mjcf_controls": lambda *, ranges, **_: (
+            "actuators ask for less than the joints' limits, which are kept: "
+            + few([f"{name} from {lower:g} to {upper:g}" for name, (lower, upper) in ranges.items()])
+        ),
         "beyond_bound": "more than {most:,.0f} {what}: no robot needs as many",
         "xacro_left_over": "<{element}/> is left over from xacro: left out",
         "only_macros": _only_macros,
@@ -117,7 +175,6 @@ WORDS = placed(
         "version_unknown": "<robot> version: expected 1.0, 1.1 or 1.2, got {got!r}",
         "no_links": "no links (in MJCF: no bodies)",
         "name_missing": "a {kind} without a name",
-        "name_reserved": "{kind} {name!r}: the name is taken by {taken_by}",
         "name_twice": "two {kind}s named {name!r}",
         "name_unknown": lambda *, kind, got, available, **_: str(no_such(kind, got, available)),
         "two_parents": lambda *, name, parents, **_: (
@@ -163,7 +220,23 @@ WORDS = placed(
         ),
         "axis_zero": "<axis> xyz is zero: {got!r}",
         "limit_missing": "a {kind} joint needs a <limit>, this one has none",
-        "limits_crossed": "<limit> lower {lower:g} is above upper {upper:g}",
+        "limits_crossed": lambda *, lower, upper, **_: "<limit> lower {} is above upper {}".format(
+            *apart(lower, upper, digits=6)
+        ),
+        "turned_twice": "<origin> has both rpy and quat_xyzw, expected one of them",
+        "quaternion_zero": "<origin> quat_xyzw is zero: no rotation has it",
+        # ------------------------------------------------------------------ what does not count
+        "element_unknown": _unknown,
+        "attribute_unknown": _unknown,
+        "element_unread": _unread,
+        "attribute_unread": _unread,
+        "element_again": lambda *, element, inside, count, **given: (
+            f"a further <{element}> in one <{inside}>{_times(count, given)} does not count: the first does"
+        ),
+        "soft_limits": _soft_limits,
+        "limits_of_continuous": lambda *, names, count, **given: (
+            f"<limit> lower and upper{_times(count, given)} do not count at continuous joints: {few(names)}"
+        ),
         "dynamics_empty": "<dynamics> has neither damping nor friction",
         # ------------------------------------------------------------------ what is odd
         "mass_large": "a mass of {mass:g} kg: is that meant?",
@@ -209,4 +282,4 @@ def refusal(file: object, *findings: Finding, lines: bool = True) -> RobotError:
 
 def line_of(finding: Finding) -> int | None:
     """The line in the file itself, not in one that it includes."""
-    return None if "file" in finding.where else finding.where.get("line")
+    return None if {"file", "srdf"} & finding.where.keys() else finding.where.get("line")

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from nmm.errors import few
 from nmm.findings.robot_file import placed
-from nmm.text_format import listed, quoted
+from nmm.text_format import apart, listed, quoted
 
 #: Why a presumed wheel joint is none, by `why`.
 NO_WHEEL = {
@@ -64,7 +64,7 @@ def _base_of_joints(
 
 
 def _posture_beyond(*, posture: str, beyond: Mapping[str, Sequence[float]], **_: object) -> str:
-    far = [f"{name} = {value:g} (from {low:g} to {high:g})" for name, (value, low, high) in beyond.items()]
+    far = ["{} = {} (from {} to {})".format(name, *apart(*three, digits=6)) for name, three in beyond.items()]
     return f"posture {posture} is outside limits: {few(far)}"
 
 
@@ -165,6 +165,18 @@ WORDS = placed(
         "collision_pairs": "{count} collision pairs: none within a body or across one joint",
         "shapes_left_out": _names("shapes left out, their meshes are missing: {names}"),
         "base_of_joints": _base_of_joints,
+        "accelerations_of_file": lambda *, limits, **_: (
+            "limits of acceleration in the file, which only Limits(acceleration=...) keeps, in scenarios "
+            "limits: acceleration: " + few([f"{name}: {value:g}" for name, value in limits.items()])
+        ),
+        "names_taken": lambda *, names, **_: (
+            "renamed, since the platform's coordinates or inputs have these names: "
+            + few([f"{old} is {new}" for old, new in names.items()])
+        ),
+        "gantry": _names(
+            "{names} slide all else and nothing turns it: a gantry, on platform fixed; --platform NAME "
+            '(platform="NAME") puts it on another'
+        ),
         "arm_mounted": lambda *, name, key, frame, base, prefix, **_: (
             f"{name} mounted{f' as {key}' if key != name else ''} at {frame} of {base}"
             f"{f', its names with the prefix {prefix}' if prefix else ''}"
@@ -210,6 +222,16 @@ WORDS = placed(
         ),
         "state_not_numbers": lambda *, name, got, **_: f"joint {name}: expected numbers, got {quoted(got)}",
         "posture_joints_unknown": _names("posture {posture}: no such joints: {names}"),
+        "posture_of_base": _names("posture {posture}: in place of {names} are x, y, theta: left out"),
+        "groups_without_inputs": _names("groups that move by no input: {names}"),
+        "srdf_names_unknown": _names("no such links, joints or groups: {names}"),
+        "virtual_joint_unused": "virtual joint {name} does not count: {child} is not the root link",
+        "motion_model_differs": "virtual joint {name} has motion model {model}, unlike platform {platform}",
+        "passive_held": lambda *, values, **_: (
+            "joints without a motor have no input and are held: "
+            + few([f"{name} at {value:g}" for name, value in values.items()])
+            + " (lock for another value)"
+        ),
         "posture_not_one_number": "posture {posture}: {name}: expected one number, got {count}: left out",
         "posture_locked": "posture {posture}: {name} is locked at {locked:g}, not at {wanted:g}",
         "posture_follows": "posture {posture}: {name} follows {leader} ({mimic}), not at {wanted:g}",

@@ -6,7 +6,7 @@ from typing import Any
 
 from nmm.errors import few
 from nmm.findings.finding import Finding, Words
-from nmm.text_format import counted, listed
+from nmm.text_format import apart, counted, listed
 
 #: The line in a run's summary of what its motors and wheels find: nothing that control is to blame for.
 MOTORS = "motors"
@@ -65,6 +65,8 @@ def _inputs_unmet(
         scaled = f"; under its {' and '.join(kept)} λ falls to {scale:.3g}"
     else:
         scaled = f"; its resolver scales the rate on purpose, down to {scale:.3g} of it"
+    if "rows" in of:
+        scaled += f"; {of['rows']} rows on {of['inputs']} inputs are done in the least-squares sense"
     return (
         f"the inputs did not do all that the task asked in {counted(samples, 'sample')} "
         f"({100 * share:.3g} %): J u differed from the rate by up to {largest:.3g} "
@@ -113,8 +115,47 @@ def _unstable(t: float, rate: float, method: str, dt: float, part: bool, **of: A
 def _beyond(one: Mapping[str, Any]) -> str:
     lower = -math.inf if one["lower"] is None else one["lower"]
     upper = math.inf if one["upper"] is None else one["upper"]
-    range_ = f"from {lower:.4g} to {upper:.4g}"
-    return f"{one['name']} at {one['t']:.3g} s ({one['value']:.4g} {one['unit']}; {range_})"
+    value, least, most = apart(one["value"], lower, upper)
+    return f"{one['name']} at {one['t']:.3g} s ({value} {one['unit']}; from {least} to {most})"
+
+
+def _too_fast(name: str, largest: float, limit: float, unit: str) -> str:
+    most, allowed = apart(largest, limit, digits=3)
+    return f"{name} ({most} {unit}; at most {allowed})"
+
+
+def _effort_exceeded(actuator: str, peak: float, effort: float, unit: str, t: float, **_: Any) -> str:
+    needed, most = apart(peak, effort, digits=3)
+    return f"{actuator} needs {needed} {unit} at t = {t:.4g} s, {100 * peak / effort:.0f} % of its {most}"
+
+
+def _left_plan(
+    m: float, rad: float, tube_m: float, tube_rad: float, t: float, back: float | None, **_: Any
+) -> str:
+    (far, tube), (turned, tube_turned) = apart(m, tube_m, digits=3), apart(rad, tube_rad, digits=3)
+    return (
+        f"the robot left its plan from t = {t:.3g} s on, by up to {far} m and {turned} rad (more than {tube} "
+        f"m or {tube_turned} rad); {'not back at the end' if back is None else f'back at t = {back:.4g} s'}"
+    )
+
+
+def _start_too_near(
+    distance: float, name: str, clearance: float, back: float | None, own: bool = False, **_: Any
+) -> str:
+    clear, kept = apart(clearance, distance)
+    return (
+        f"the start is nearer than the distance to keep, {kept} m: {name}, {clear} m; "
+        f"{'not back at the end' if back is None else f'back at t = {back:.3g} s'}"
+        f"{_OVERLAP if own and clearance <= 0.0 else ''}"
+    )
+
+
+def _distance_not_kept(distance: float, samples: int, name: str, clearance: float, t: float, **_: Any) -> str:
+    clear, kept = apart(clearance, distance)
+    return (
+        f"the distance of {kept} m could not be kept in {counted(samples, 'sample')}: {name} came to {clear} "
+        f"m at t = {t:.3g} s"
+    )
 
 
 def _degrees(angles: Mapping[str, float], **_: Any) -> str:
@@ -239,16 +280,9 @@ WORDS: Mapping[str, Words] = {
         f"without effect on task and objective: {', '.join(inputs)}; at first order nothing moves "
         f"{'it' if len(inputs) == 1 else 'them'} (an objective can)"
     ),
-    "effort_exceeded": lambda actuator, peak, effort, unit, t, **_: (
-        f"{actuator} needs {peak:.3g} {unit} at t = {t:.4g} s, "
-        f"{100 * peak / effort:.0f} % of its {effort:.3g}"
-    ),
+    "effort_exceeded": _effort_exceeded,
     "tips": _tips,
-    "left_plan": lambda m, rad, tube_m, tube_rad, t, back, **_: (
-        f"the robot left its plan from t = {t:.3g} s on, by up to {m:.3g} m and {rad:.3g} rad (more than "
-        f"{tube_m:g} m or {tube_rad:g} rad); "
-        f"{'not back at the end' if back is None else f'back at t = {back:.4g} s'}"
-    ),
+    "left_plan": _left_plan,
     "pictures_lost": (
         "{lost} of {taken} pictures did not come or did not show all points, for up to {gap:.3g} s at a time"
     ),
@@ -292,10 +326,7 @@ WORDS: Mapping[str, Words] = {
     ),
     "inputs_beyond_limits": lambda inputs, **_: (
         "inputs exceed their limits: "
-        + ", ".join(
-            f"{one['name']} ({one['largest']:.3g} {one['unit']}; at most {one['limit']:.3g})"
-            for one in inputs
-        )
+        + ", ".join(_too_fast(one["name"], one["largest"], one["limit"], one["unit"]) for one in inputs)
     ),
     "functions_beyond_limits": lambda functions, **_: (
         "limits of functions are broken: "
@@ -313,15 +344,8 @@ WORDS: Mapping[str, Words] = {
         f"{unit}"
     ),
     "distances_note": "{text}",
-    "start_too_near": lambda distance, name, clearance, back, own=False, **_: (
-        f"the start is nearer than the distance to keep, {distance:g} m: {name}, {clearance:.4g} m; "
-        f"{'not back at the end' if back is None else f'back at t = {back:.3g} s'}"
-        f"{_OVERLAP if own and clearance <= 0.0 else ''}"
-    ),
-    "distance_not_kept": lambda distance, samples, name, clearance, t, **_: (
-        f"the distance of {distance:g} m could not be kept in {counted(samples, 'sample')}: {name} came to "
-        f"{clearance:.4g} m at t = {t:.3g} s"
-    ),
+    "start_too_near": _start_too_near,
+    "distance_not_kept": _distance_not_kept,
     "braked": lambda samples, in_vain, **_: (
         f"in {counted(samples, 'sample')} the inputs went towards braking to keep distances"
         f"{f', {in_vain} of them in vain' if in_vain else ''}"

@@ -33,7 +33,7 @@ class Efforts:
 
     def legs(self, motion: TimedLegs) -> TimedLegs:
         """The legs, each no faster than its motors allow."""
-        if not np.isfinite(motion.acceleration).all():
+        if not np.isfinite([motion.acceleration, motion.braking]).all():
             raise InputError(where="plan: effort", expected="limits of acceleration for all inputs")
         shares = np.linspace(0.0, 1.0, PLACES)
         factors = np.ones(len(motion.legs))
@@ -41,16 +41,20 @@ class Efforts:
             q = np.array([motion.guide.at(corner, leg, share) for share in shares])
             u, none = np.tile(way, (PLACES, 1)), np.zeros((PLACES, len(way)))
             held = self._torques(q, none, none)
-            speeding = np.abs(self._torques(q, none, u) - held) * motion.acceleration[k]
+            speeding = self._torques(q, none, u) - held
+            up, down = speeding * motion.acceleration[k], -speeding * motion.braking[k]
             moving = (self._torques(q, u, none) - held) * motion.speed[k] ** 2
             factors[k] = self._factor(
-                held, speeding + np.maximum(moving, 0.0), -speeding + np.minimum(moving, 0.0)
+                held,
+                np.maximum(up, down) + np.maximum(moving, 0.0),
+                np.minimum(up, down) + np.minimum(moving, 0.0),
             )
         times = np.diff(motion.stops) / np.sqrt(factors)
         return replace(
             motion,
             speed=motion.speed * np.sqrt(factors),
             acceleration=motion.acceleration * factors,
+            braking=motion.braking * factors,
             stops=np.cumsum([0.0, *times]),
         )
 

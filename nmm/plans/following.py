@@ -22,8 +22,8 @@ from nmm.robots.robot import Robot
 
 #: Between two knots of a table pass at most so many s.
 KNOT = 0.02
-#: Numbers of a table before its knots.
-HEADER = 2
+#: Numbers of a table before `Robot.turns` and `Robot.own_or_leader`, n each, and its knots.
+HEADER = 1
 #: A table that is renewed has room for so many times the plan's knots, and for so many s at least.
 ROOM, ROOM_FOR = 4, 120.0
 #: After another plan was made, or none was found, the next is made so much later at the earliest, s.
@@ -32,18 +32,18 @@ WAIT = 1.0
 
 @compiled
 def off_plan(t: float, q: Array, numbers: Array, m: int, off: Array, rate: Array) -> int:
-    """Write q - q_plan(t) (n,), the angle of the platform wrapped, and the plan's q_dot (n,), by a table of
+    """Write q - q_plan(t) (n,) by the short way round, and the plan's q_dot (n,), by a table of
     `from_plan` for m inputs; returns where the knot before t is in it."""
     n = q.shape[0]
-    size = 1 + (2 + m) * n
+    size, first = 1 + (2 + m) * n, HEADER + 2 * n
     k, last = 0, int(numbers[0]) - 2
     while k < last:  # the last knot that is not after t
         middle = (k + last + 1) // 2
-        if numbers[HEADER + middle * size] <= t:
+        if numbers[first + middle * size] <= t:
             k = middle
         else:
             last = middle - 1
-    a = HEADER + k * size
+    a = first + k * size
     b = a + size
     h = numbers[b] - numbers[a]
     share = (t - numbers[a]) / h
@@ -55,16 +55,20 @@ def off_plan(t: float, q: Array, numbers: Array, m: int, off: Array, rate: Array
         c, d = 3.0 * rise - h * (2.0 * v + v_end), h * (v + v_end) - 2.0 * rise
         off[i] = q[i] - (p + s * (h * v + s * (c + s * d)))
         rate[i] = 0.0 if rests else v + s * (2.0 * c + 3.0 * s * d) / h
-    if numbers[1] == 1.0:
-        off[2] -= 2.0 * math.pi * math.floor(0.5 + off[2] / (2.0 * math.pi))
+    full = scratch(n)
+    for i in range(n):
+        own = off[int(numbers[HEADER + n + i])]
+        full[i] = numbers[HEADER + i] * math.floor(0.5 + own / (2.0 * math.pi))
+    for i in range(n):
+        off[i] -= 2.0 * math.pi * full[i]
     return a
 
 
 @kernel(FUNCTION)
 def from_plan(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
-    """W(t) (q - q_plan(t)), the angle of the platform wrapped; at rest before the first and after the last
-    knot. numbers = [knots, 1 with a platform that turns, then for each knot its time, q (n,), q_dot (n,) and
-    W (n_u, n)]: q is cubic between two knots and W linear. Of two knots at one time the second counts."""
+    """W(t) (q - q_plan(t)) by the short way round; at rest before the first and after the last knot.
+    numbers = [knots, turns (n,), own or leader (n,), then for each knot its time, q (n,), q_dot (n,) and W
+    (n_u, n)]: q is cubic between two knots and W linear. Of two knots at one time the second counts."""
     n, m = at.q.shape[0], rows.value.shape[0]
     off, rate = scratch(n), scratch(n)
     a = off_plan(at.t, at.q, numbers, m, off, rate)
@@ -164,10 +168,9 @@ class FromPlan(Function):
 
     def table(self, knots: Array, room: int = 0) -> Array:
         """What `from_plan` reads, of knots, with room for so many."""
-        numbers = np.zeros(HEADER + max(len(knots), room) * knots.shape[1])
-        numbers[:HEADER] = len(knots), self.robot.platform.n_p >= 3
-        numbers[HEADER : HEADER + knots.size] = knots.ravel()
-        return numbers
+        head = np.concatenate([[len(knots)], self.robot.turns(), self.robot.own_or_leader])
+        free = max(len(knots), room) * knots.shape[1] - knots.size
+        return np.concatenate([head, knots.ravel(), np.zeros(free)])
 
     def apart(self, t: ArrayLike, q: ArrayLike) -> Array:
         """How far configurations (N, n) are from the plan at their times (N,), s: (N, 2), m and rad."""
@@ -264,11 +267,8 @@ class Renewed(Renewal):
 
 
 def differences(robot: Robot, q: Array, there: Array) -> Array:
-    """q - there (N, n), the angle of a platform wrapped; one of the two may be a single (n,)."""
-    off = q - there
-    if robot.platform.n_p >= 3:
-        off[:, 2] -= 2.0 * np.pi * np.round(off[:, 2] / (2.0 * np.pi))
-    return np.asarray(off)
+    """q - there (N, n) by the short way round; one of the two may be a single (n,)."""
+    return robot.short_way(q - there)
 
 
 def left_inverses(robot: Robot, times: Array, q: Array, u: Array, tau: float, length: float) -> Array:

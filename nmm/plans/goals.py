@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias
@@ -66,12 +67,12 @@ class GoalPostures:
             pair = self.check.too_near(q)
             if pair >= 0 and self.check.scene is not None:
                 self.in_the_way[self.check.scene.words(pair)] += 1
-            elif not any(np.allclose(q, other, atol=1e-3) for other in found):
+            elif not any(np.abs(self.robot.short_way(q - other)).max() < 1e-3 for other in found):
                 found.append(q)
             if len(found) == count:
                 break
         first = min(3, self.robot.platform.n_p)
-        return sorted(found, key=lambda q: float(np.abs(q[first:] - start[first:]).sum()))
+        return sorted(found, key=lambda q: float(np.abs(self.robot.short_way(q - start)[first:]).sum()))
 
     def _reaching(self, wanted: object, start: Array, rng: np.random.Generator) -> Iterator[Array | None]:
         robot = self.robot
@@ -112,6 +113,7 @@ class Newton(NamedTuple):
     """A task to reach, beside its `Program` in memory.
 
     units (s,) : of its rows (`unit_codes`); met (3,) : errors that are small enough, m, rad and other units
+    wrapped (s,) : 1 where target less value is an angle that goes the short way, else 0
     compared () : 1 where the rows of the error are the task's own comparison, 0 for target less value
     limits (2, n) : the least and the largest q; mimic_joints : the robot's; leads (n, n) : what all
     coordinates do where those that follow no other move
@@ -120,6 +122,7 @@ class Newton(NamedTuple):
 
     units: IntegerVector
     met: Vector
+    wrapped: IntegerVector
     compared: IntegerCell
     limits: Matrix
     mimic_joints: Vector
@@ -138,6 +141,8 @@ def newton_step(t: float, q: Array, moves: int, integers: Integers, floats: Arra
     e, J, s, n, compared = own.error, own.error_q, own.error.shape[0], q.shape[0], own.compared[()] == 1
     for i in range(s):
         e[i] = b.value[2 * s + i] if compared else b.value[s + i] - b.value[i]
+        if own.wrapped[i] == 1:
+            e[i] = math.pi - (math.pi - e[i]) % (2.0 * math.pi)
         for j in range(n):
             J[i, j] = 0.0
             for k in range(n):
@@ -194,6 +199,9 @@ class TaskError:
         newton = Newton(
             units=unit_codes(rows),
             met=np.array([MET * tolerance.m, MET * tolerance.rad, 1e-4]),
+            wrapped=np.array(
+                [row.angular and task.function.comparison is None for row in rows], dtype=np.int64
+            ),
             compared=np.array(int(task.function.comparison is not None), dtype=np.int64),
             limits=self._limits,
             mimic_joints=following.table.ravel(),

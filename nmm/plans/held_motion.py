@@ -81,7 +81,7 @@ class HeldTiming:
             speed = np.minimum(speed, np.min(self.usual / np.abs(usual), axis=1))
             spins = spins_of(robot, nodes[[0, -1]], np.tile(driven, (2, 1)), limits)
             speed = np.minimum(speed, np.min(limits.spin / spins, initial=np.inf))
-        x = fastest(np.minimum(speed**2, 1e8), share, U, U_share, limits.accelerations)
+        x = fastest(np.minimum(speed**2, 1e8), share, U, U_share, limits.changes)
         s = np.sqrt(x)
         times = 2.0 * np.diff(share) / (s[:-1] + s[1:])
         u = U * s[:, np.newaxis]
@@ -103,7 +103,7 @@ class HeldTiming:
         a = np.diff(whole, axis=0) / steps[:, np.newaxis]
         with np.errstate(divide="ignore", invalid="ignore"):
             over = np.where(whole >= 0.0, whole / limits.inputs[:, 1], whole / limits.inputs[:, 0])
-            harder = float(np.nanmax(np.abs(a) / limits.accelerations, initial=0.0))
+            harder = float(np.nanmax(a / np.where(a >= 0.0, *limits.changes.T[::-1]), initial=0.0))
         slower = max(1.0, float(np.nanmax(over, initial=0.0)), math.sqrt(harder)) * (1.0 + 1e-9)
         turn = float(np.abs(np.diff(q[:, 2:3], axis=0)).max(initial=0.0)) if p >= 3 else 0.0
         samples = Samples(
@@ -141,15 +141,16 @@ class HeldTiming:
         return rates
 
 
-def fastest(top: Array, share: Array, U: Array, U_share: Array, most: Array) -> Array:
+def fastest(top: Array, share: Array, U: Array, U_share: Array, changes: Array) -> Array:
     """The largest squares of the speed x (K + 1,), below top and 0 at both ends, with which accelerations
-    U_share x + U x_share / 2 (K + 1, m) are at most `most` (m,) at both ends of each piece."""
+    U_share x + U x_share / 2 (K + 1, m) are within `changes` (m, 2) at both ends of each piece."""
     h = np.diff(share)[:, np.newaxis]
     near, far = 0.5 * U[:-1] / h, 0.5 * U[1:] / h
-    limited = np.isfinite(most)
-    a = np.hstack([(U_share[:-1] - near)[:, limited], -far[:, limited]]) / np.tile(most[limited], 2)
-    b = np.hstack([near[:, limited], (U_share[1:] + far)[:, limited]]) / np.tile(most[limited], 2)
-    a, b = np.hstack([a, -a]), np.hstack([b, -b])
+    limited = np.isfinite(changes).any(axis=1)
+    a = np.hstack([(U_share[:-1] - near)[:, limited], -far[:, limited]])
+    b = np.hstack([near[:, limited], (U_share[1:] + far)[:, limited]])
+    low, high = np.tile(changes[limited].T, 2)
+    a, b = np.hstack([a / high, a / low]), np.hstack([b / high, b / low])
     x = top.copy()
     x[0] = x[-1] = 0.0
     for k in range(len(h) - 1, 0, -1):

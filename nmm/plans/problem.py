@@ -64,7 +64,7 @@ def shooting_problem(
     that move."""
     zeros = np.zeros
     n, m, N = robot.n, robot.n_u, len(q) - 1
-    hardest = limits.accelerations
+    hardest = np.abs(limits.changes).max(axis=1)
     # Between two ends of samples a joint can go farther than at both, while it turns round.
     room = np.minimum(q[[0, -1]] - limits.coordinates[:, 0], limits.coordinates[:, 1] - q[[0, -1]])
     over = np.zeros(n)
@@ -77,7 +77,7 @@ def shooting_problem(
         [
             limits.coordinates + np.column_stack([over, -over]),
             top,
-            np.column_stack([-hardest, hardest]),
+            limits.changes,
         ]
     )
     column, side = np.nonzero(np.isfinite(ends))

@@ -72,7 +72,9 @@ class Search:
         self.limits = asked.limits.on(robot)
         self.usual = usual_speeds(robot, self.limits)
         speeds, reverses = leg_speeds(robot, self.limits, self.usual), self.limits.inputs[:1, 0] < 0.0
-        ways = ways_of(robot, speeds, pause_between(self.limits), reverses=bool(np.all(reverses)))
+        ways = ways_of(
+            robot, speeds, pause_between(self.limits), bool(np.all(reverses)), self.limits.coordinates
+        )
         self.low, self.high = drawn_within(robot, start, goals, given.obstacles)
         trees = Trees(
             ways=ways,
@@ -157,7 +159,14 @@ class Search:
         found = [q for one in alternatives(wanted) for q in postures.find(one, here, self.rng)]
         if not found:
             raise nothing_found(postures)
-        return found
+        return [self.near(q, here) for q in found]
+
+    def near(self, q: Array, here: Array) -> Array:
+        """The same posture with its joints the short way round from a configuration (n,)."""
+        turns, robot = self.robot.turns(self.limits.coordinates), self.robot
+        turns[: robot.platform.n_p] = 0.0
+        full = 2.0 * np.pi
+        return np.asarray(q - full * turns * np.round((q - here)[robot.own_or_leader] / full))
 
     def way(
         self, start: Array, goals: Sequence[Array], ahead: Sequence[Array] = (), behind: Sequence[Array] = ()

@@ -59,7 +59,9 @@ def drawn_within(
     """Where configurations are drawn, (n,) each: joints within limits, the platform around all that is
     known."""
     low, high = np.where(robot.limited, robot.q_limits, [-np.pi, np.pi]).T.copy()
-    low, high = np.maximum(low, start - np.pi), np.minimum(high, start + np.pi)
+    turns = robot.continuous
+    low = np.where(turns, start - np.pi, np.maximum(low, start - np.pi))
+    high = np.where(turns, start + np.pi, np.minimum(high, start + np.pi))
     if robot.platform.n_p >= 3:
         points = [start[:2]]
         for obstacle in obstacles:

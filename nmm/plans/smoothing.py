@@ -140,7 +140,7 @@ class Smoothing:
         if w:  # c is the limit less the rate, and plus it
             left = x.c[1:-1, B : B + 2 * w].reshape(-1, w, 2).min(axis=2)
             needed = max(needed, float(np.max((x.spin - left) / x.spin)))
-        hardest = float(np.max(np.abs(x.a) / limits.accelerations))
+        hardest = float(np.max(x.a / np.where(x.a >= 0.0, *limits.changes.T[::-1])))
         return min(1.0, max(needed, math.sqrt(hardest)) * (1.0 + 1e-8))
 
     def solved(self, most: int = FIRST) -> bool:

@@ -20,7 +20,8 @@ class TimedLegs:
 
     guide : along them
     legs (L, 3 + n); corners (L + 1, n); inputs (L, n_u) : what the inputs add up to on each leg
-    speed, acceleration (L,) : the largest of its share, 1/s and 1/s²; stops (L + 1,) : when each begins, s
+    speed, acceleration, braking (L,) : the largest of its share, 1/s and 1/s²; stops (L + 1,) : when each
+    begins, s
     """
 
     guide: Guide
@@ -29,6 +30,7 @@ class TimedLegs:
     inputs: Array
     speed: Array
     acceleration: Array
+    braking: Array
     stops: Array
 
     @property
@@ -48,14 +50,14 @@ class TimedLegs:
         """The leg at each time (N,), s, how much of it is gone, and its rate, 1/s."""
         leg = np.clip(np.searchsorted(self.stops, t, side="right") - 1, 0, max(len(self.legs) - 1, 0))
         after, length = t - self.stops[leg], self.stops[leg + 1] - self.stops[leg]
-        V, A = self.speed[leg], self.acceleration[leg]
-        ramp = np.where(np.isfinite(A), V / np.where(np.isfinite(A), A, 1.0), 0.0)
+        V, A, B = self.speed[leg], self.acceleration[leg], self.braking[leg]
+        ramp = V / A
         to_end = np.maximum(length - after, 0.0)
-        rising, falling = after < ramp, to_end < ramp
-        A = np.where(np.isfinite(A), A, 0.0)
+        rising, falling = after < ramp, to_end < V / B
+        A, B = (np.where(np.isfinite(one), one, 0.0) for one in (A, B))
         share = V * (after - 0.5 * ramp)
-        share = np.where(rising, 0.5 * A * after**2, np.where(falling, 1.0 - 0.5 * A * to_end**2, share))
-        rate = np.where(rising, A * after, np.where(falling, A * to_end, V))
+        share = np.where(rising, 0.5 * A * after**2, np.where(falling, 1.0 - 0.5 * B * to_end**2, share))
+        rate = np.where(rising, A * after, np.where(falling, B * to_end, V))
         return leg, np.clip(share, 0.0, 1.0), rate
 
 
@@ -65,20 +67,25 @@ def timed(guide: Guide, robot: Robot, start: Array, legs: Array, limits: LimitsO
     corners = guide.corners(start, legs)
     inputs = np.array([inputs_of_leg(robot, q, leg) for q, leg in zip(corners[:-1], legs, strict=True)])
     inputs = inputs.reshape(-1, robot.n_u)
-    reached = np.where(inputs >= 0.0, limits.inputs[:, 1], -limits.inputs[:, 0])
+    falling, rising = -limits.changes[:, 0], limits.changes[:, 1]
+    forwards = inputs >= 0.0
+    reached = np.where(forwards, limits.inputs[:, 1], -limits.inputs[:, 0])
     with np.errstate(divide="ignore"):
         speed = np.min(reached / np.abs(inputs), axis=1, initial=np.inf)
         speed = np.minimum(speed, np.min(usual / np.abs(legs), axis=1, initial=np.inf))
         spins = np.maximum(*(spins_of(robot, q, inputs, limits) for q in (corners[:-1], corners[1:])))
         speed = np.minimum(speed, np.min(limits.spin / spins, axis=1, initial=np.inf))
-        acceleration = np.min(limits.accelerations / np.abs(inputs), axis=1, initial=np.inf)
-    # Too short to reach its speed: half of it faster, half slower.
-    speed = np.minimum(speed, np.sqrt(acceleration))
-    ramps = np.where(
-        np.isfinite(acceleration), speed / np.where(np.isfinite(acceleration), acceleration, 1.0), 0.0
-    )
+        acceleration, braking = (
+            np.min(one / np.abs(inputs), axis=1, initial=np.inf)
+            for one in (np.where(forwards, rising, falling), np.where(forwards, falling, rising))
+        )
+        # Too short to reach its speed: first faster, then slower.
+        slow = 1.0 / acceleration + 1.0 / braking
+        speed = np.minimum(speed, np.sqrt(2.0 / slow))
+    ramps = 0.5 * np.where(slow > 0.0, speed, 0.0) * slow
     return TimedLegs(
-        guide, legs, corners, inputs, speed, acceleration, np.cumsum([0.0, *(1.0 / speed + ramps)])
+        *(guide, legs, corners, inputs, speed, acceleration, braking),
+        np.cumsum([0.0, *(1.0 / speed + ramps)]),
     )
 
 

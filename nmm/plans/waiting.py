@@ -44,6 +44,7 @@ class Drive(NamedTuple):
     b: float
     speed: float
     acceleration: float
+    braking: float
     passes: Array
 
 
@@ -101,24 +102,26 @@ def _drives(path: TimedLegs, cells: list[tuple[int, Array]], i: int) -> Iterator
         j += 1
         leg, a, b = cells[i][0], cells[i][1][0], cells[j - 1][1][-1]
         borders = np.concatenate([cells[i][1], *(one[1:] for _, one in cells[i + 1 : j])]) - a
-        V, A, way = float(path.speed[leg]), float(path.acceleration[leg]), float(b - a)
-        V = min(V, np.sqrt(way * A))
-        ramp = V / A
+        V, A, B = float(path.speed[leg]), float(path.acceleration[leg]), float(path.braking[leg])
+        way = float(b - a)
+        V = min(V, np.sqrt(2.0 * way / (1.0 / A + 1.0 / B)) if np.isfinite(min(A, B)) else np.inf)
+        rise, fall = V / A, V / B
         to_end = np.maximum(way - borders, 0.0)
-        passes = 0.5 * ramp + borders / V
-        slow = 0.5 * V * ramp
-        if ramp > 0.0:
-            passes = np.where(borders < slow, np.sqrt(2.0 * borders / A), passes)
-            passes = np.where(to_end < slow, way / V + ramp - np.sqrt(2.0 * to_end / A), passes)
+        passes = 0.5 * rise + borders / V
+        if rise > 0.0:
+            passes = np.where(borders < 0.5 * V * rise, np.sqrt(2.0 * borders / A), passes)
+        if fall > 0.0:
+            last = way / V + 0.5 * (rise + fall)
+            passes = np.where(to_end < 0.5 * V * fall, last - np.sqrt(2.0 * to_end / B), passes)
         for pace in PACES:
-            yield j, Drive(leg, a, b, pace * V, pace * pace * A, passes / pace)
+            yield j, Drive(leg, a, b, pace * V, pace * pace * A, pace * pace * B, passes / pace)
 
 
 def _timing(
     path: TimedLegs, before: dict[tuple[int, int], tuple[int, int, Drive]], i: int, k: int
 ) -> TimedLegs:
     """The timing that is at the place i at interval k, from its drives."""
-    rows: list[tuple[Array, Array, float, float, float]] = []
+    rows: list[tuple[Array, Array, float, float, float, float]] = []
     nothing = np.zeros(path.legs.shape[1]), np.zeros(path.inputs.shape[1])
     end = k * STEP
     while True:
@@ -127,16 +130,19 @@ def _timing(
         i_before, begun, drive = before.get((i, k), (0, 0, None))
         arrives = 0.0 if drive is None else begun * STEP + float(drive.passes[-1])
         if end - arrives > 1e-9:
-            rows.append((*nothing, 1.0 / (end - arrives), np.inf, end))
+            rows.append((*nothing, 1.0 / (end - arrives), np.inf, np.inf, end))
         if drive is None:
             break
         share = drive.b - drive.a
         legs, inputs = share * path.legs[drive.leg], share * path.inputs[drive.leg]
-        rows.append((legs, inputs, drive.speed / share, drive.acceleration / share, arrives))
+        speed, acceleration, braking = (
+            one / share for one in (drive.speed, drive.acceleration, drive.braking)
+        )
+        rows.append((legs, inputs, speed, acceleration, braking, arrives))
         i, k, end = i_before, begun, begun * STEP
-    legs, inputs, speed, acceleration, stops = (np.array(one) for one in zip(*rows[::-1], strict=True))
+    legs, inputs, fast, rises, falls, stops = (np.array(one) for one in zip(*rows[::-1], strict=True))
     corners = path.guide.corners(path.corners[0], legs)
-    return TimedLegs(path.guide, legs, corners, inputs, speed, acceleration, np.append(0.0, stops))
+    return TimedLegs(path.guide, legs, corners, inputs, fast, rises, falls, np.append(0.0, stops))
 
 
 class _Rooms:

@@ -8,7 +8,7 @@ import numpy as np
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.kernels.compiled import clear, compiled, scratch
-from nmm.kernels.record_layout import Cell, IntegerCell, Vector
+from nmm.kernels.record_layout import Cell, IntegerCell, IntegerVector, Vector
 from nmm.plans.words import PARTS, dubins, reeds_shepp, wrapped
 from nmm.platforms.steering import SteeredAxle, SteeringPivot
 from nmm.platforms.tractor import Tractor
@@ -33,6 +33,7 @@ class Ways(NamedTuple):
     steering () : the coordinate that is the steering angle, or -1; wheelbase () : tan(angle) = wheelbase /
         radius
     speeds (3 + n,) : of each number of a leg, to weigh them; pause () : what a stop between legs takes, s
+    turns, own_or_leader (n,) : see `Robot`
     """
 
     kind: IntegerCell
@@ -42,6 +43,8 @@ class Ways(NamedTuple):
     wheelbase: Cell
     speeds: Vector
     pause: Cell
+    turns: Vector
+    own_or_leader: IntegerVector
 
 
 @compiled
@@ -59,12 +62,22 @@ def leg_time(ways: Ways, leg: Array) -> float:
 
 
 @compiled
+def joint_way(ways: Ways, a: Array, b: Array, i: int) -> float:
+    """How far coordinate i goes from a to b (n,), the short way round."""
+    far = b[i] - a[i]
+    if ways.turns[i] != 0.0:
+        j = ways.own_or_leader[i]
+        far -= 2.0 * math.pi * ways.turns[i] * math.floor(0.5 + (b[j] - a[j]) / (2.0 * math.pi))
+    return far
+
+
+@compiled
 def least_time(ways: Ways, a: Array, b: Array) -> float:
     """No way from a to b takes less, s."""
     first = 3 if ways.kind[()] != STANDS else 0
     longest = math.hypot(b[0] - a[0], b[1] - a[1]) / ways.speeds[0] if first == 3 else 0.0
     for i in range(first, a.shape[0]):
-        longest = max(longest, abs(b[i] - a[i]) / ways.speeds[3 + i])
+        longest = max(longest, abs(joint_way(ways, a, b, i)) / ways.speeds[3 + i])
     return longest
 
 
@@ -148,7 +161,7 @@ def find_way(ways: Ways, a: Array, b: Array, legs: Array) -> int:
     first = 0 if kind == STANDS else (3 if ways.steering[()] < 0 else 4)
     moves = False
     for i in range(first, n):
-        moves = moves or abs(b[i] - a[i]) > SHORT
+        moves = moves or abs(joint_way(ways, a, b, i)) > SHORT
     if not moves:
         return count
     total = 0.0
@@ -159,7 +172,7 @@ def find_way(ways: Ways, a: Array, b: Array, legs: Array) -> int:
     for k in range(count):
         share = leg_time(ways, legs[k]) / total if total > 0.0 else 1.0
         for i in range(first, n):
-            legs[k, 3 + i] = share * (b[i] - a[i])
+            legs[k, 3 + i] = share * joint_way(ways, a, b, i)
     return count
 
 
@@ -172,8 +185,8 @@ def way_time(ways: Ways, legs: Array, count: int) -> float:
     return total
 
 
-def ways_of(robot: Robot, speeds: Array, pause: float, reverses: bool) -> Ways:
-    """The ways of a robot's platform.
+def ways_of(robot: Robot, speeds: Array, pause: float, reverses: bool, limits: Array | None = None) -> Ways:
+    """The ways of a robot's platform, and of its joints within limits (n, 2).
 
     Raises
     ------
@@ -218,6 +231,8 @@ def ways_of(robot: Robot, speeds: Array, pause: float, reverses: bool) -> Ways:
         wheelbase=np.array(wheelbase),
         speeds=speeds,
         pause=np.array(pause),
+        turns=robot.turns(limits),
+        own_or_leader=robot.own_or_leader.copy(),
     )
 
 

@@ -27,6 +27,7 @@ from nmm.platforms.wheel_layout import (
     symmetric_limit,
     wheels_on,
 )
+from nmm.text_format import apart
 
 #: Beyond its limit a hitch is folded by more than this, rad.
 _SLACK = 1e-9
@@ -228,8 +229,8 @@ class Tractor(Platform):
         """The first hitch that is folded beyond its limit."""
         for trailer, angle in zip(self.trailers, np.asarray(qp)[3:], strict=True):
             if trailer.max_angle is not None and abs(angle) > trailer.max_angle + _SLACK:
-                folded, limit = math.degrees(abs(angle)), math.degrees(trailer.max_angle)
-                return f"{trailer.joint} is folded to {folded:.4g} degrees, beyond its limit of {limit:.4g}"
+                folded, limit = apart(math.degrees(abs(angle)), math.degrees(trailer.max_angle))
+                return f"{trailer.joint} is folded to {folded} degrees, beyond its limit of {limit}"
         return None
 
 

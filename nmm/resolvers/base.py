@@ -10,7 +10,7 @@ import numpy as np
 from numba import types
 
 from nmm.arrays import Array, Integers, array
-from nmm.errors import InputError, expect, expect_known, few
+from nmm.errors import InputError, expect, expect_known
 from nmm.findings import Finding
 from nmm.kernels.compiled import Kernel, caller, compiled
 from nmm.kernels.record_layout import LaidOutRecord, Memory, header_length, views
@@ -168,6 +168,8 @@ class Resolver(ABC):
     regular and no limit holds them back, or its status says that it found none; else False. A subclass
     declares it beside its kernel; it has no default.
 
+    `more_rows` states whether it takes tasks with more rows than inputs, by least squares.
+
     `takes_added_task` states whether it solves the added task's rows too; `start(dimensions)` returns the
     state of a resolver with memory; `alpha_at` is the place of the step size α among its numbers. With `step`
     "armijo" the controller, which knows the motion, shortens α at each sample.
@@ -188,6 +190,7 @@ class Resolver(ABC):
     name: ClassVar[str]
     exact: ClassVar[bool]
     takes_added_task: ClassVar[bool] = False
+    more_rows: ClassVar[bool] = False
     alpha_at: ClassVar[int | None] = None
     step: StepRule = "constant"
 
@@ -219,13 +222,19 @@ class Resolver(ABC):
         return
 
     def check(self, dimensions: Dimensions, *, all_levels: bool = False) -> None:
-        """`InputError` when the task's first level, or all of them, have more rows than there are inputs."""
+        """`InputError` when the task's first level, or all of them, have more rows than there are inputs, and
+        the resolver does not take these."""
         expect(dimensions.s >= 1, "task", "at least one row")
         rows = dimensions.s if all_levels or not dimensions.levels else dimensions.levels[0]
-        if rows > dimensions.m:
+        if rows > dimensions.m and not self.more_rows:
             which = "task" if rows == dimensions.s else "task: first level"
-            expected = f"at most {dimensions.m} rows, as many as inputs ({few(dimensions.inputs)})"
-            raise InputError(where=which, expected=expected, got=rows)
+            raise InputError(
+                f"more rows than the {dimensions.m} inputs",
+                where=which,
+                expected="priorities (position 1, orientation 2, say) with resolver pg or dls, or dls alone, "
+                "which does all at once in the least-squares sense",
+                got=rows,
+            )
 
     def resolve(self, problem: Problem, state: State | None = None) -> Answer:
         """The answer to one problem; it updates `state` (from `start`)."""

@@ -16,7 +16,7 @@ from nmm.arrays import Array, Integers
 from nmm.kernels.active_set import DEPENDENT, Basis, combination, join, nearest, split
 from nmm.kernels.compiled import clear, compiled, integer_scratch, scratch
 from nmm.kernels.damping import CONSTANT, Law, damped_solution
-from nmm.kernels.linear_algebra import add, copied, dot, project_out, times, times_matrix
+from nmm.kernels.linear_algebra import add, copied, dot, norm, project_out, times, times_matrix
 from nmm.resolvers.answer import INEXACT, RELAXED, AnswerArrays, certify
 from nmm.resolvers.limit_check import rows_of_limits
 from nmm.resolvers.problem_arrays import LOWER, UPPER, ProblemArrays
@@ -32,14 +32,34 @@ BARRED = -1
 
 
 @compiled
-def damp(problem: ProblemArrays, alpha: float, law: Law, W: Array, answer: AnswerArrays) -> None:
-    """Write u, measure, residual, status and nu; W holds C (m, m), or (0, 0) where every weight is 1."""
+def damp(
+    problem: ProblemArrays, alpha: float, law: Law, W: Array, dt: float, answer: AnswerArrays
+) -> tuple[float, float]:
+    """Write u, measure, residual, status and nu; W holds C (m, m), or (0, 0) where every weight is 1; dt, s :
+    for which the law is resolved. Returns `overrun` of the damped part."""
     s, m = problem.J.shape
     J, u0, solution = scratch((s, m)), scratch(m), scratch(m)
     weigh(problem, alpha, W, J, u0)
-    scales, dt = problem.row_scales, problem.dt[()]
-    found = damped_solution(J, scales, problem.rate, problem.ends, u0, law, dt, solution, answer.nu)
+    scales, damped = problem.row_scales, scratch(m)
+    found = damped_solution(J, scales, problem.rate, problem.ends, u0, law, dt, solution, answer.nu, damped)
     give(problem, W, solution, found, answer)
+    unweigh(W, damped, solution)
+    return overrun(problem, solution)
+
+
+@compiled
+def overrun(problem: ProblemArrays, asked: Array) -> tuple[float, float]:
+    """How long the previous inputs run on along the inputs asked for (m,) if these turn back, below 0 if they
+    do not, s; and how long those that are asked, or the previous ones, take to be reached from rest."""
+    along, size, change = dot(problem.before, asked), norm(asked), math.inf
+    if size == 0.0:
+        return 0.0, 0.0
+    for j in range(asked.shape[0]):
+        if asked[j] != 0.0:
+            most = problem.rising[j] if asked[j] > 0.0 else problem.falling[j]
+            change = min(change, most * size / abs(asked[j]))
+    along /= size * change
+    return -along, max(abs(along), size / change)
 
 
 @compiled
@@ -107,7 +127,7 @@ def any_passed(problem: ProblemArrays, u: Array) -> bool:
 
 @compiled
 def damp_between_stops(
-    problem: ProblemArrays, alpha: float, law: Law, W: Array, answer: AnswerArrays
+    problem: ProblemArrays, alpha: float, law: Law, W: Array, dt: float, answer: AnswerArrays
 ) -> None:
     """`damp` for a task with one level, with inputs held at stops that they would pass."""
     s, m = problem.J.shape
@@ -123,7 +143,7 @@ def damp_between_stops(
     k, found = 0, (0.0, False)
     cost = law.damping * law.damping if law.mode == CONSTANT else 0.0
     for _ in range(ROUNDS * stops):
-        found = between(problem, J, u0, G, held, basis, k, law, solution, answer.nu)
+        found = between(problem, J, u0, G, held, basis, k, law, dt, solution, answer.nu)
         asked = fall(problem, J, solution, u0, cost, falls)
         split(basis, k, falls)
         combination(basis, k, basis.d, multipliers)
@@ -185,6 +205,7 @@ def between(
     basis: Basis,
     used: int,
     law: Law,
+    dt: float,
     solution: Array,
     shares: Array,
 ) -> tuple[float, bool]:
@@ -203,8 +224,8 @@ def between(
         b[i] = problem.rate[i] - dot(J[i], start)
         copied(J[i], A[i])
         project_out(A[i], basis.Q, used)
-    scales, dt = problem.row_scales, problem.dt[()]
-    found = damped_solution(A, scales, b, problem.ends, free, law, dt, solution, shares)
+    scales = problem.row_scales
+    found = damped_solution(A, scales, b, problem.ends, free, law, dt, solution, shares, nothing)
     add(solution, 1.0, start)
     return found
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from nmm.arrays import Array, Integers, positive
 from nmm.errors import expect_known
-from nmm.kernels.compiled import Kernel, kernel, view
+from nmm.kernels.compiled import Kernel, compiled, kernel, view
 from nmm.kernels.damping import BELOW, LARGEST, Law
 from nmm.resolvers.answer import AnswerArrays
 from nmm.resolvers.base import RESOLVER, Resolver, Setup, StepRule, Weights, metric_root, step_rule
@@ -17,25 +17,47 @@ from nmm.resolvers.limit_check import bring_within
 from nmm.resolvers.problem import Dimensions
 from nmm.resolvers.problem_arrays import ProblemArrays
 
-#: Numbers: α, λ, ε and, with weights, C row by row. Options: the law, in the order of `Damping`.
-ALPHA, DAMPING, THRESHOLD, C = 0, 1, 2, 3
+#: Numbers: α, λ, ε, the time that `adapted` remembers and, with weights, C row by row. Options: the law, in
+#: the order of `Damping`.
+ALPHA, DAMPING, THRESHOLD, LASTING, C = 0, 1, 2, 3, 4
 LAW = 0
 
+#: The time for which λ is raised grows by this share of how long the robot runs on, and falls as fast.
+GROWS = 0.2
+
 Damping = Literal["constant", "variable", "directions"]
+
+
+@compiled
+def adapted(lasting: float, dt: float, against: float, needed: float) -> float:
+    """The time in which λ lets inputs change to what is asked of damped directions, s; 0 for a sample's.
+
+    Inputs whose accelerations are limited run on for `against` s where they are asked to turn back. An arm
+    that is stretched towards a target out of reach then swings through, and with a λ for single samples for
+    ever. So the time grows meanwhile, and later falls, but not below what the inputs `needed` then.
+    """
+    if against > 0.0 and dt > 0.0:
+        return max(lasting, min(against + dt, max(lasting, dt) + GROWS * dt))
+    if lasting > 0.0 and needed >= 0.0:
+        return min(lasting, max(lasting - GROWS * dt, needed))
+    return lasting
 
 
 @kernel(RESOLVER)
 def damped_least_squares(
     problem: ProblemArrays, numbers: Array, options: Integers, state: Integers, answer: AnswerArrays
 ) -> None:
-    """`damped_solution`, between stops; limits keep u near it in the metric of the weights."""
+    """`damped_solution`, between stops, for a time that is `adapted`; limits keep u near it in the metric of
+    the weights."""
     m = problem.J.shape[1]
     plain = numbers.shape[0] == C
     W = view(numbers, 0 if plain else C, (0, 0) if plain else (m, m))
-    law = Law(options[LAW], numbers[DAMPING], numbers[THRESHOLD])
-    damp(problem, numbers[ALPHA], law, W, answer)
+    law, dt = Law(options[LAW], numbers[DAMPING], numbers[THRESHOLD]), problem.dt[()]
+    lasting = max(dt, numbers[LASTING]) if numbers[LASTING] > 0.0 else dt
+    against, needed = damp(problem, numbers[ALPHA], law, W, lasting, answer)
+    numbers[LASTING] = adapted(numbers[LASTING], dt, against, needed)
     if problem.ends.shape[0] == 1 and any_passed(problem, answer.u):
-        damp_between_stops(problem, numbers[ALPHA], law, W, answer)
+        damp_between_stops(problem, numbers[ALPHA], law, W, lasting, answer)
     bring_within(problem, W, answer)
 
 
@@ -44,6 +66,10 @@ class DampedLeastSquares(Resolver):
 
     Rows are taken in their natural scales, weights as for the projected gradient. A run continues at singular
     configurations: the inputs stay bounded, and the answer's ν is the share of its rate that the task gets.
+    A task may have more rows than there are inputs: u is then the best in the least-squares sense, damped and
+    limited likewise, and the residual is what of the rate is left undone. Under limits of acceleration λ
+    grows where the robot runs on against what is asked, and falls again.
+
     The objective affects the task only in directions with σ below the threshold, which become part of the
     null space as σ falls to 0: so u is continuous where the rank changes.
 
@@ -73,6 +99,7 @@ class DampedLeastSquares(Resolver):
 
     name: ClassVar[str] = "dls"
     exact: ClassVar[bool] = False
+    more_rows: ClassVar[bool] = True
     kernel: ClassVar[Kernel] = damped_least_squares
     alpha_at: ClassVar[int | None] = ALPHA
 
@@ -96,5 +123,5 @@ class DampedLeastSquares(Resolver):
     def setup(self, dimensions: Dimensions) -> Setup:
         self.check(dimensions)
         C = metric_root(self.weights, dimensions)
-        numbers = np.array([self.alpha, self.damping, self.threshold, *C])
+        numbers = np.array([self.alpha, self.damping, self.threshold, 0.0, *C])
         return Setup(numbers, np.array([get_args(Damping).index(self.law)], dtype=np.int64))

@@ -101,7 +101,7 @@ def damped_beside(problem: ProblemArrays, tolerance: float, answer: AnswerArrays
     ends, shares = integer_scratch(1), scratch(1)
     ends[0] = k
     scales, dt = problem.added_row_scales, problem.dt[()]
-    least, damped = damped_solution(A, scales, b, ends, u0, USUAL, dt, free, shares)
+    least, damped = damped_solution(A, scales, b, ends, u0, USUAL, dt, free, shares, scratch(m))
     if not damped:
         return False
     add(u, 1.0, free)
@@ -123,7 +123,7 @@ def damped_levels(problem: ProblemArrays, answer: AnswerArrays) -> bool:
         ends[level] = problem.ends[level]
     ends[levels] = m
     clear(u0)
-    least, damped = damped_solution(A, scales, b, ends, u0, USUAL, problem.dt[()], u, shares)
+    least, damped = damped_solution(A, scales, b, ends, u0, USUAL, problem.dt[()], u, shares, scratch(m))
     if not damped:
         return False
     copied(u, answer.u)

@@ -13,6 +13,7 @@ from nmm.arrays import Array, Integers, array, scalar, vector
 from nmm.errors import InputError, expect
 from nmm.resolvers.problem_arrays import ProblemArrays
 from nmm.resolvers.saturation import limit
+from nmm.text_format import apart
 
 #: Fields of `ProblemArrays` besides the problem's own numbers.
 MEMORY = ("ends", "stops", "active", "limiter")
@@ -66,6 +67,7 @@ class Problem:
     limit_levels : (l,) 0 for rows that are always kept (default); k for those kept before the k-th level of
         priority, as far as the levels above it allow
     before : (m,) the previous inputs, 0 when not given
+    falling, rising : (m,) how fast inputs may fall and rise, above 0, per second; infinite when not given
     dt : how long u will be applied, s; NaN where unknown
 
     Raises
@@ -96,6 +98,8 @@ class Problem:
     upper: ArrayLike | None = None
     limit_levels: ArrayLike | None = None
     before: ArrayLike | None = None
+    falling: ArrayLike | None = None
+    rising: ArrayLike | None = None
     dt: float = float("nan")
 
     def __post_init__(self) -> None:
@@ -126,6 +130,8 @@ class Problem:
             **_bounds(self.lower, self.upper, count, "lower", "upper"),
             "limit_levels": _limit_levels(self.limit_levels, count, len(levels)),
             "before": np.zeros(m) if self.before is None else vector(self.before, m, "before"),
+            "falling": _rates(self.falling, m, "falling"),
+            "rising": _rates(self.rising, m, "rising"),
             "dt": float("nan") if np.isnan(self.dt) else scalar(self.dt, "dt"),
         }
         vars(self).update(given)
@@ -172,6 +178,12 @@ def _scales(value: ArrayLike | None, count: int, name: str) -> Array:
     return scales
 
 
+def _rates(value: ArrayLike | None, count: int, name: str) -> Array:
+    rates = np.full(count, np.inf) if value is None else np.array(value, dtype=np.float64)
+    expect(rates.shape == (count,) and np.all(rates > 0.0), name, f"{count} numbers above 0", rates)
+    return rates
+
+
 def _limit_levels(value: ArrayLike | None, count: int, levels: int) -> Integers:
     given = np.zeros(count) if value is None else vector(value, count, "limit_levels")
     if np.any((given < 0) | (given > levels + 1) | (given != np.floor(given))):
@@ -188,5 +200,6 @@ def _bounds(lower: ArrayLike | None, upper: ArrayLike | None, count: int, *names
         found[name] = bounds
     low, high = found.values()
     for i in np.flatnonzero(low > high):
-        raise InputError(f"{low[i]:g} of number {i} is above its {names[1]}, {high[i]:g}", where=names[0])
+        above, below = apart(float(low[i]), float(high[i]), digits=6)
+        raise InputError(f"{above} of number {i} is above its {names[1]}, {below}", where=names[0])
     return found

@@ -36,6 +36,7 @@ class ProblemArrays(NamedTuple):
     active ((levels + 1) (2 + m + l),) : those active at the previous step, level by level, then after all
         levels (see `nearest_within`); changed
     before (m,) : the previous inputs
+    falling, rising (m,) : how fast inputs may fall and rise, per second; infinite for none
     dt () : how long u will be applied, s; NaN where unknown
     limiter : address of `limit`; 0 without limits
 
@@ -63,5 +64,7 @@ class ProblemArrays(NamedTuple):
     stops: SampledIntegerVector
     active: SampledIntegerVector
     before: SampledVector
+    falling: Vector
+    rising: Vector
     dt: Cell
     limiter: int

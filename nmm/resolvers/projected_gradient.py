@@ -32,7 +32,7 @@ def projected_gradient(
     plain, alpha = numbers.shape[0] == C, numbers[ALPHA]
     W = view(numbers, 0 if plain else C, (0, 0) if plain else (m, m))
     if problem.ends.shape[0] > 1:
-        damp(problem, alpha, USUAL, W, answer)
+        damp(problem, alpha, USUAL, W, problem.dt[()], answer)
         bring_within(problem, W, answer)
         return
     order, L, Q = integer_scratch(s), scratch((s, s)), scratch((s, m))

@@ -126,7 +126,7 @@ def damp_weighted(problem: ProblemArrays, numbers: Array, W: Array, answer: Answ
     clear(W)
     for j in range(W.shape[0]):
         W[j, j] = numbers[C + j] if numbers.shape[0] > C else 1.0
-    damp(problem, numbers[ALPHA], USUAL, W, answer)
+    damp(problem, numbers[ALPHA], USUAL, W, problem.dt[()], answer)
 
 
 @compiled

@@ -13,6 +13,7 @@ from nmm.errors import InputError, expect_known, few
 from nmm.platforms.base import Platform
 from nmm.robots.mimic_joints import SLACK, MimicJoint, MimicJoints
 from nmm.robots.semantics import POSTURE, Named, NamedPostures, Semantics
+from nmm.text_format import apart
 
 #: A limit this large is none, m or rad.
 UNLIMITED = 1e5
@@ -32,6 +33,11 @@ class Coordinates:
     def locked(self) -> Mapping[str, float]:
         """Where (m or rad) loading fixed joints that were named, or that follow such a joint."""
         return {} if self.parts is None else dict(self.parts.provenance.held)
+
+    @property
+    def renamed(self) -> Mapping[str, str]:
+        """The names of joints and links that have another name in the file, by that name (`load`)."""
+        return {} if self.parts is None else dict(self.parts.provenance.renamed)
 
     @property
     def postures(self) -> NamedPostures:
@@ -98,6 +104,53 @@ class Coordinates:
         """Whether each lower and upper limit of `q_limits` is one, (n, 2): finite and below 1e5 in size."""
         # URDF asks for two numbers at every sliding joint: files write ±1e9 or the largest float for "none".
         return unwritable(np.isfinite(self.q_limits) & (np.abs(self.q_limits) < UNLIMITED))
+
+    @cached_property
+    def endless(self) -> Flags:
+        """Whether each coordinate is an angle without limits, (n,), which sensors may tell in (-π, π]."""
+        kinds = [self.model.joints[joint].shortname() for joint in self._joints]
+        screws = np.array(["JointModelH" in kind for kind in kinds], dtype=bool)
+        turns = (np.array(self.q_units) == "rad") & ~self.limited.any(axis=1) & ~screws
+        turns[2 : min(3, self.platform.n_p)] = True  # θ, whatever the file says of it
+        return unwritable(turns)
+
+    @cached_property
+    def continuous(self) -> Flags:
+        """Whether a full turn of each independent coordinate leads to the same posture, (n,): θ, joints that
+        the file calls continuous, others without limits. A joint that would not come round with it makes its
+        leader none."""
+        found = self.endless.copy()
+        for one, f, leader in zip(
+            self.mimic_joints, self.following.columns, self.following.leaders, strict=True
+        ):
+            comes_round = not one.multiplier or (self.endless[f] and float(one.multiplier).is_integer())
+            found[leader] &= comes_round
+        found[self.following.columns] = False
+        return unwritable(found)
+
+    def turns(self, limits: Array | None = None) -> Array:
+        """What a full turn of each coordinate, or of the one that it follows, turns it by, (n,): 1 of
+        continuous ones, the multiplier of joints that follow these, 0 of others. A joint within limits (n, 2)
+        makes none."""
+        free = self.continuous.copy()
+        if limits is not None:
+            free[self.platform.n_p :] &= ~np.isfinite(limits[self.platform.n_p :]).any(axis=1)
+        found = free.astype(np.float64)
+        following = self.following
+        found[following.columns] = following.multipliers * found[following.leaders]
+        return found
+
+    def short_way(self, off: Array) -> Array:
+        """Differences of configurations (..., n) by the short way round: of continuous ones in [-π, π]."""
+        full = 2.0 * np.pi
+        return np.asarray(off - full * self.turns() * np.round(off[..., self.own_or_leader] / full))
+
+    @cached_property
+    def own_or_leader(self) -> Integers:
+        """Each coordinate's own index or, of a mimic joint, its leader's, (n,)."""
+        found = np.arange(self.n)
+        found[self.following.columns] = self.following.leaders
+        return unwritable(found)
 
     @cached_property
     def u_limits(self) -> Array:
@@ -191,9 +244,9 @@ class Coordinates:
 
     @property
     def rest(self) -> Array:
-        """The configuration nearest to zero within the limits, (n,)."""
+        """The configuration within the limits nearest to zero, or to where the file has it at first, (n,)."""
         lower, upper = self.q_limits.T
-        return self.following.placed(np.clip(np.zeros(self.n), lower, upper))
+        return self.following.placed(np.clip(self.q(self.semantics.start), lower, upper))
 
     def outside(self, q: ArrayLike, limits: Array | None = None) -> dict[str, str]:
         """The coordinates of q (n,) outside limits (n, 2), by default the robot's: by name, in words."""
@@ -201,7 +254,7 @@ class Coordinates:
         limits = self.q_limits if limits is None else limits
         following = {one.joint for one in self.mimic_joints}  # their leaders' limits are theirs, too
         return {
-            name: f"{name} = {value:g} {unit} (from {lower:g} to {upper:g})"
+            name: "{0} = {2} {1} (from {3} to {4})".format(name, unit, *apart(value, lower, upper, digits=6))
             for name, value, unit, (lower, upper) in zip(self.q_names, q, self.q_units, limits, strict=True)
             if name not in following and not lower - SLACK <= value <= upper + SLACK
         }

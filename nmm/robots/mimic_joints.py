@@ -40,6 +40,11 @@ class MimicJoint:
         """Where it stands with its leader there."""
         return self.multiplier * leader + self.offset
 
+    def with_names(self, names: Mapping[str, str]) -> MimicJoint:
+        """The same with new names of joints, by the old ones."""
+        joint, leader = (names.get(name, name) for name in (self.joint, self.leader))
+        return MimicJoint(joint, leader, self.multiplier, self.offset)
+
     def renamed(self, prefix: str) -> MimicJoint:
         """The same with a prefix before both names."""
         return MimicJoint(prefix + self.joint, prefix + self.leader, self.multiplier, self.offset)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, matrix, scalar, vector
 from nmm.errors import InputError, expect_known, few, no_such
+from nmm.robots.encoders import Turns
 from nmm.robots.robot import Robot
 from nmm.robots.wheel_rates import wheel_rates, wheel_shares
 from nmm.robots.zero_order_hold import HeldInputs
+from nmm.text_format import apart
 
 #: Where Gauss and Legendre look between two readings, for two looks.
 NODES = 0.5 - math.sqrt(3.0) / 6.0, 0.5 + math.sqrt(3.0) / 6.0
@@ -121,6 +123,7 @@ class Odometry:
         spread: float = 0.0,
         covariance: ArrayLike | None = None,
         fastest: float | Mapping[str, float] | None = None,
+        wrapped: bool | Collection[str] | None = None,
     ) -> None:
         self._where = f"odometry: {robot.name}"
         if robot.platform.n_p < 3:
@@ -141,9 +144,10 @@ class Odometry:
         own = robot.q_names[3 : robot.platform.n_p]
         self._hitches = [name for name in own if robot.coordinate(name) not in self._counters.steered]
         self._held = HeldInputs(robot)
-        self._counts = self._read(encoders)[0]
+        wheels, first = counted_wheels(robot), self._read(encoders)[0]
+        self._turns = Turns(self._counters.names, wheels, wrapped, first, self._where)
         M, _ = self._counters.matrix(self.q[3 : robot.platform.n_p])
-        self._counters.solved(M, self._counts, dict.fromkeys(self._counters.steered, 0.0))  # or says why not
+        self._counters.solved(M, first, dict.fromkeys(self._counters.steered, 0.0))  # or says why not
 
     def update(self, encoders: Mapping[str, float], t: float | None = None) -> Array:
         """q (n,) at these readings, rad or m: of the wheels that were counted at first, and of the joints.
@@ -159,12 +163,22 @@ class Odometry:
         InputError : a wheel or joint is missing, a number is not finite, a counter jumped; nothing is changed
             then
         """
-        counts, ahead = self._read(encoders)
+        readings, ahead = self._read(encoders)
+        most = np.full(len(readings), math.inf)
+        lasted = math.nan
         if t is not None:
             t = scalar(t, f"{self._where}: t")
-            self._check_jumps(counts - self._counts, max(t - self._t, 0.0))
+            lasted = max(t - self._t, 0.0)
+            with np.errstate(invalid="ignore"):  # infinite in no time
+                most = FASTER * self._fastest * lasted + JUMPS
+        counts = self._turns.after(readings, most)
+        by = counts - self._turns.counts
+        for k in np.flatnonzero(np.abs(by) > most)[:1]:
+            what = f"{self._counters.names[k]} jumped: it cannot turn so far in {lasted:.3g} s"
+            _, allowed = apart(float(abs(by[k])), float(most[k]), digits=3)
+            raise InputError(what, where=self._where, expected=f"at most {allowed}", got=float(by[k]))
         robot, n_p = self.robot, self.robot.platform.n_p
-        turned = self._shares * (counts - self._counts)
+        turned = self._shares * by
         before, after = self.q[3:n_p], ahead[3:n_p]
         looks = [self._counters.matrix(before + node * (after - before)) for node in NODES]
         M = 0.5 * (looks[0][0] + looks[1][0])
@@ -193,19 +207,12 @@ class Odometry:
             carried[:2, 2] = -step[1], step[0]
             mean = 0.5 * (looks[0][1] + looks[1][1])
             noise = turn @ slope @ mean @ slopes * self._shares
-            added = noise * (self._spread * np.abs(counts - self._counts)) @ noise.T
+            added = noise * (self._spread * np.abs(by)) @ noise.T
             self.covariance = carried @ self.covariance @ carried.T + added
-        self.q, self._counts = ahead, counts
+        self._turns.take(readings, counts)
+        self.q = ahead
         self._t = math.nan if t is None else t
         return ahead.copy()
-
-    def _check_jumps(self, turned: Array, lasted: float) -> None:
-        """`lasted` nan: no reading before."""
-        with np.errstate(invalid="ignore"):  # infinite in no time
-            most = FASTER * self._fastest * lasted + JUMPS
-        for k in np.flatnonzero(np.abs(turned) > most)[:1]:
-            what = f"{self._counters.names[k]} jumped: it cannot turn so far in {lasted:.3g} s"
-            raise InputError(what, where=self._where, expected=f"at most {most[k]:.3g}", got=float(turned[k]))
 
     def _by_counter(self, given: float | Mapping[str, float] | None, usual: Array, what: str) -> Array:
         """Numbers (k,), one a counter: the same for all, or by name."""

@@ -231,6 +231,9 @@ class Robot(Coordinates):
         covariance : of x, y, theta (3, 3) at first; zero by default
         fastest : turning rate of a wheel (rad/s; of an input its own unit) beyond which `update` refuses a
             reading whose time it is given: a number, or by name; the file's limit by default
+        wrapped : True, or names, for wheels that are read within one turn, (-π, π] or [0, 2π): no step may be
+            more than half a turn, and `update` refuses those that could be; False for counters that count
+            turns; by default as the readings show, with a warning where a turn ended
 
         Raises
         ------

@@ -42,7 +42,7 @@ class NamedPostures(dict[str, Mapping[str, float]]):
 
 @dataclass(frozen=True)
 class Semantics:
-    """What the SRDF beside a robot's file says of it, in the robot's own names.
+    """What the SRDF beside a robot's file, or an MJCF file itself, says of it, in the robot's own names.
 
     Attributes
     ----------
@@ -51,6 +51,7 @@ class Semantics:
     disabled : pairs of links that are not to be kept apart
     files : where it was read
     notes : what of it does not fit the robot
+    start : where its file has it stand at first, m and rad; what is not there is at zero
 
     Examples
     --------
@@ -65,6 +66,7 @@ class Semantics:
     disabled: tuple[tuple[str, str], ...] = ()
     files: tuple[Path, ...] = ()
     notes: tuple[Finding, ...] = ()
+    start: Mapping[str, float] = field(default_factory=dict)
 
     def with_arm(self, arm: Semantics, prefix: str, arms_own: Collection[str]) -> Semantics:
         """A platform's with an arm's own joints (not its base's), prefixed; a shared posture sets both."""
@@ -79,5 +81,11 @@ class Semantics:
             if members:
                 groups.setdefault(prefix + name, members)
         disabled = tuple((prefix + one, prefix + other) for one, other in arm.disabled)
-        whole = self.disabled + disabled, self.files + arm.files, self.notes + arm.notes
+        start = {prefix + name: value for name, value in arm.start.items() if prefix + name in arms_own}
+        whole = (
+            self.disabled + disabled,
+            self.files + arm.files,
+            self.notes + arm.notes,
+            {**self.start, **start},
+        )
         return Semantics(postures, groups, *whole)

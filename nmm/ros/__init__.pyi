@@ -1,6 +1,7 @@
+from .frames import Transforms as Transforms
+from .frames import odometry as odometry
 from .joint_states import JointStates as JointStates
 from .making import Messages as Messages
-from .reading import Transforms as Transforms
 from .reading import base as base
 from .reading import inputs as inputs
 from .reading import joint_trajectory as joint_trajectory

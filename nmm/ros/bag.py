@@ -1,80 +1,67 @@
-"""Logs of robots read back: a rosbag2 folder, .mcap or .db3 file as a trajectory."""
+"""Logs of robots read back: a rosbag2 folder, an .mcap, .db3 or ROS 1's .bag file as a trajectory."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+import warnings
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nmm.arrays import Array, Integers, interpolated
+from nmm.arrays import Array, Integers
 from nmm.control.quantities import saved
-from nmm.errors import InputError, RunError, expect
-from nmm.files import expect_file
+from nmm.errors import InputError, expect
+from nmm.findings import Finding
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
-from nmm.ros import reading
-from nmm.ros.joint_states import JointStates
-from nmm.ros.log import INPUTS, JOINTS, MAP, ODOMETRY, TF, TF_STATIC, rosbags, typestore
-from nmm.ros.making import root_link
+from nmm.ros.recorded import Names, Recorded
+from nmm.ros.routes import Route, routes
+from nmm.ros.tracks import by_differences, contradict, settle
 from nmm.runs.trajectory import Trajectory
+from nmm.runs.verdict import Verdict
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-#: The messages' types by the topics that are read.
-TYPES = {
-    "joints": "sensor_msgs/msg/JointState",
-    "odometry": "nav_msgs/msg/Odometry",
-    "tf": "tf2_msgs/msg/TFMessage",
-}
 #: More samples are no bag that one looks at.
 MOST = 2_000_000
-
-
-@dataclass
-class Track:
-    """Values (k,) at times, ns, as they come."""
-
-    times: list[int] = field(default_factory=list)
-    rows: list[Array] = field(default_factory=list)
-
-    def add(self, time: int, row: Array) -> None:
-        self.times.append(time)
-        self.rows.append(row)
-
-    def sorted(self) -> tuple[Integers, Array]:
-        """Times (N,), ns, that increase, and rows (N, k); of equal times the last."""
-        latest = dict(zip(self.times, self.rows, strict=True))
-        times = np.array(sorted(latest), dtype=np.int64)
-        return times, np.array([latest[time] for time in times.tolist()])
+#: What is left out, or missing in between, for longer, s, is told.
+LONG = 1.0
 
 
 def read_bag(
     path: str | Path,
     robot: Robot,
     *,
-    joints: str = JOINTS,
-    odometry: str = ODOMETRY,
+    joints: str | Sequence[str] = "joint_states",
+    odometry: str = "odom",
+    tf: str = "tf",
+    map: str = "map",
+    odom: str = "odom",
     base: str | None = None,
+    namespace: str = "",
+    prefix: str | None = None,
     frame: str | None = None,
 ) -> Trajectory:
-    """The motion of a robot in a rosbag2 folder, an .mcap or a .db3 file.
+    """The motion of a robot in a rosbag2 folder, an .mcap, a .db3 or ROS 1's .bag file.
 
-    It is sampled where joint states come; the platform is where the frame `map` has it or, in a bag without,
-    where odometry does, linearly in between. With both, odometry is `believed`. Inputs are those recorded (in
-    a log of nmm's), or the nearest to the velocities recorded, or else to differences of q. Times are the
-    messages' headers', from the first sample on; messages out of order are sorted. Joints that the robot does
-    not have are left out; those that come in several messages are joined.
+    It is sampled where joint states come, each joint linear between its own stamps; the platform is where the
+    frame `map` has it or, in a bag without, where odometry does. Each edge of a chain of transforms is
+    interpolated on its own stamps; one that jumps stays until then. With both, odometry is `believed`. Inputs
+    are those recorded (in a log of nmm's), or the nearest to the velocities recorded, or else to differences
+    of q. Times are the messages' headers', from the first sample on; messages out of order are sorted. Joints
+    that the robot does not have are left out. What is doubtful is a warning of the trajectory, and a
+    `RuntimeWarning`.
 
     Parameters
     ----------
-    path : the bag
+    path : the bag; of one that lacks its end, what is there is read
     robot : whose it is
-    joints, odometry : topics of JointState and Odometry
-    base : the platform's frame in TF; the robot's root link by default
+    joints, odometry, tf : topics of JointState (or several), Odometry and TFMessage, /tf_static beside the
+        latter; without a slash in front in the namespace, where /tf may be all robots'
+    map, odom : frames
+    base : a frame of the platform; by default any that the robot's file, or what is static in TF, has fixed
+        to it. Poses and velocities of such frames are brought to the reference point. One that neither knows
+        is taken for the reference point's
+    namespace : that of the topics
+    prefix : what the names of the robot's frames begin with; the namespace, where there are such frames
     frame : the end-effector's frame, whose path is shown
 
     Returns
@@ -83,8 +70,8 @@ def read_bag(
 
     Raises
     ------
-    InputError : no bag, a damaged one, or one of another robot: a joint is missing; no such topic; numbers
-        that are not finite
+    InputError : no bag, a damaged one, or one of another robot: a joint is missing; no such topic; odometry
+        of a frame from which nothing leads to the platform
 
     Examples
     --------
@@ -94,18 +81,24 @@ def read_bag(
     True
     """
     file = Path(path)
-    at = root_link(robot) if base is None else base
-    found = _Reader(robot, file, joints, odometry, at).read()
-    times, q, u, believed = found
+    topics = (joints,) if isinstance(joints, str) else tuple(joints)
+    names = Names(topics, odometry, tf, map, odom, base, namespace, prefix)
+    try:
+        motion = _Motion(Recorded(robot, file, names))
+    except InputError as error:
+        raise (error if str(file) in error.where else error.at(file)) from None
+    times, q, u = motion.times, motion.q, motion.u
     t = (times - times[0]) / 1e9
     count = len(t)
-    q_dot = np.array([robot.S(here) @ now for here, now in zip(q, u, strict=True)])
+    q_dot = np.array([robot.S(at) @ now for at, now in zip(q, u, strict=True)])
     place = None
     if frame is not None:
-        place = np.array([Configuration(robot, here).placement(frame).translation for here in q])
+        place = np.array([Configuration(robot, at).placement(frame).translation for at in q])
     sizes = {"N": count, "n": robot.n, "m": robot.n_u}
     arrays = {one.name: one.absent(**sizes) for one in saved() if not one.optional}
-    arrays |= {"t": t, "q": q, "u": u, "q_dot": q_dot, "path": place, "believed": believed}
+    arrays |= {"t": t, "q": q, "u": u, "q_dot": q_dot, "path": place, "believed": motion.believed}
+    for finding in motion.findings:
+        warnings.warn(f"{file.name}: {finding}", RuntimeWarning, stacklevel=2)
     return Trajectory.of(
         arrays,
         robot=robot,
@@ -114,150 +107,159 @@ def read_bag(
         resolver="bag",
         method="recorded",
         dt=float(np.median(np.diff(t))) if count > 1 else 0.0,
+        verdict=Verdict().after(motion.findings),
         frame=frame,
         label=file.stem,
     )
 
 
-class _Reader:
-    def __init__(self, robot: Robot, file: Path, joints: str, odometry: str, base: str) -> None:
-        self.robot, self.file, self.base = robot, file, base
-        self.topics = {joints: "joints", odometry: "odometry", TF: "tf", TF_STATIC: "tf", INPUTS: "inputs"}
-        self._own = robot.q_names[min(3, robot.platform.n_p) :]
-        self._states = JointStates(robot)
-        self._missing: InputError | None = None
-        self.joints, self.rates, self.inputs = Track(), Track(), Track()
-        self.odometry, self.twists, self.map, self.moved = Track(), Track(), Track(), Track()
-        self._frames = reading.Transforms()
+class _Motion:
+    """Times (N,), ns, q (N, n), u (N, n_u) of what was recorded, and `believed`, what odometry has beside a
+    map."""
 
-    def read(self) -> tuple[Integers, Array, Array, Array | None]:
-        """Times (N,), ns, q (N, n), u (N, n_u), and what odometry has beside a map."""
-        for kind, message in self._messages():
-            try:
-                self._take(kind, message)
-            except InputError as error:
-                raise error.at(self.file) from None
-        times, q, believed = self._configurations()
-        return times, q, self._inputs(times, q), believed
+    def __init__(self, recorded: Recorded) -> None:
+        self.recorded, self.robot = recorded, recorded.robot
+        self.findings = list(recorded.findings)
+        world, counted = routes(recorded) if self.robot.platform.n_p else (None, None)
+        both = [route for route in (world, counted) if route is not None]
+        edges = {edge: None for route in both for edge, _ in route.way if not edge.static}
+        self.findings += settle([*recorded.tracks(), *((edge.topic, edge.track) for edge in edges)])
+        for route in both:
+            self.findings += route.findings
+        self.times = self._times(world)
+        self.q, self.believed = self._configurations(world, counted)
+        for edge, told in {edge: told for route in both for edge, told in route.told_jumps().items()}.items():
+            at = (told.pop("ns") - self.times[0]) / 1e9
+            self.findings.append(Finding("pose_jumps", {"edge": edge.name, **told}, {"t": at}))
+        self.u = self._inputs(world, counted)
+        self.findings = [*{str(one): one for one in self.findings}.values()]
 
-    def _messages(self) -> Iterator[tuple[str, Any]]:
-        try:
-            expect_file(self.file)
-        except OSError as error:
-            raise InputError(f"cannot be read: {error.strerror}", where=self.file) from None
-        rosbag2, store = rosbags("rosbag2"), typestore()
-        try:
-            with rosbag2.Reader(self.file) as bag:
-                wanted = [one for one in bag.connections if self._wanted(one)]
-                self._check_topics(bag.connections, [self.topics[one.topic] for one in wanted])
-                for connection, _, data in bag.messages(connections=wanted):
-                    yield self.topics[connection.topic], store.deserialize_cdr(data, connection.msgtype)
-        except (InputError, RunError):
-            raise
-        except Exception as error:  # of a stranger's bytes the reader says all kinds
-            reason = str(error) or type(error).__name__
-            raise InputError(f"is no bag of ROS 2, or a damaged one ({reason})", where=self.file) from None
+    def _times(self, world: Route | None) -> Integers:
+        """When there are samples: where any joint's position comes, all are known, and the platform is."""
+        recorded = self.recorded
+        if recorded.own:
+            known = {name: recorded.positions[name].sorted()[0] for name in recorded.positions_of}
+            times = np.unique(np.concatenate([*known.values()]))
+            times = times[times >= max(stamps[0] for stamps in known.values())]
+            self._tell_silent(known, times)
+        elif world is not None and world.carrier is not None:
+            times = world.carrier.poses[0]
+        else:
+            raise InputError("neither joints nor a platform that moves: no times")
+        expect(len(times) < MOST, "joint states", f"at most {MOST}", len(times))
+        if world is None:
+            return times
+        first, last = world.span()
+        within = (times >= first) & (times <= last)
+        if not within.any():
+            apart = f"{(first - times[0]) / 1e9:.3g} to {(last - times[0]) / 1e9:.3g} s"
+            what = f"the platform's pose is known from {apart} after the first joint state, the last is at"
+            what += f" {(times[-1] - times[0]) / 1e9:.3g} s"
+            raise InputError(what, expected="joint states while the platform's pose is known")
+        left = (np.ptp(times) - np.ptp(times[within])) / 1e9
+        if left > LONG:
+            self.findings.append(Finding("platform_unknown", {"s": left}))
+        return np.asarray(times[within])
 
-    def _wanted(self, connection: Any) -> bool:
-        kind = self.topics.get(connection.topic)
-        return kind is not None and connection.msgtype == TYPES.get(kind, TYPES["joints"])
+    def _tell_silent(self, known: dict[str, Integers], times: Integers) -> None:
+        for name, stamps in known.items():
+            usual = 3 * np.diff(stamps).max() if len(stamps) > 1 else 0
+            if len(times) and times[-1] - stamps[-1] > max(usual, 1e9 * LONG):
+                t = max(0.0, (stamps[-1] - times[0]) / 1e9)
+                where = {"t": t, "last": (times[-1] - times[0]) / 1e9}
+                self.findings.append(Finding("joint_silent", {"name": name}, where))
 
-    def _check_topics(self, connections: Sequence[Any], kinds: Sequence[str]) -> None:
-        asked = {kind: topic for topic, kind in reversed(self.topics.items())}
-        needed = [["joints"]] if self._own else []
-        needed += [["odometry", "tf"]] if self.robot.platform.n_p else []
-        for some in needed:
-            if not {*some} & {*kinds}:
-                topics = " or ".join(f"{TYPES[kind]} on {asked[kind]}" for kind in some)
-                there = [f"{one.topic} ({one.msgtype})" for one in connections]
-                raise InputError(where=self.file, expected=f"a topic of {topics}", available=there)
+    def _configurations(self, world: Route | None, counted: Route | None) -> tuple[Array, Array | None]:
+        robot, times, recorded = self.robot, self.times, self.recorded
+        q = np.zeros((len(times), robot.n))
+        if recorded.own:
+            names = [*recorded.positions]
+            rows = np.column_stack([recorded.position(name).between(times) for name in names])
+            base = np.zeros(3) if robot.platform.n_p else None
+            steered = not {*names} <= {*recorded.own, *robot.locked}
+            for k, row in enumerate(rows.tolist()):  # swivels say an angle up to full turns
+                near = q[k - 1] if steered and k else None
+                q[k] = robot.q_from(dict(zip(names, row, strict=True)), base, near)
+        if world is None:
+            return q, None
+        q[:, :3] = world.base(times)
+        self._tell_gaps(world)
+        if counted is None:
+            return q, None
+        believed = q.copy()
+        believed[:, :3] = counted.base(times)
+        believed[:, 2] += 2 * np.pi * np.round((q[0, 2] - believed[0, 2]) / (2 * np.pi))
+        return q, believed
 
-    def _take(self, kind: str, message: Any) -> None:
-        if kind == "joints":
-            self._take_joints(message)
-        elif kind == "inputs":
-            rates = reading.rates(message)
-            if {*self.robot.u_names} <= {*rates}:
-                self.inputs.add(
-                    reading.nanoseconds(message), np.array([rates[x] for x in self.robot.u_names])
-                )
-        elif kind == "odometry":
-            time = reading.nanoseconds(message)
-            self.odometry.add(time, reading.base(message))
-            self.twists.add(time, reading.twist(message))
-        elif kind == "tf" and message.transforms:
-            self._frames.add(message)
-            for frame, track in ((MAP, self.map), ("odom", self.moved)):
-                if self._frames.connects(frame, self.base):
-                    track.add(reading.nanoseconds(message), self._frames.base(frame, self.base))
+    def _tell_gaps(self, world: Route) -> None:
+        stamps = self.times[:0] if world.carrier is None else world.carrier.poses[0]
+        lasts = np.diff(stamps)
+        for k in np.flatnonzero(lasts > max(1e9 * LONG, 10 * np.median(lasts) if len(lasts) else 0)):
+            if np.any((self.times > stamps[k]) & (self.times < stamps[k + 1])):
+                t, end = ((stamps[i] - self.times[0]) / 1e9 for i in (k, k + 1))
+                self.findings.append(Finding("platform_silent", {}, {"t": float(t), "end": float(end)}))
 
-    def _take_joints(self, message: Any) -> None:
-        if not self._states.add(message):
-            return
-        try:
-            base = np.zeros(3) if self.robot.platform.n_p else None
-            near = self.joints.rows[-1] if self.joints.rows else None
-            q = self.robot.q_from(self._states.joints, base, near)
-        except InputError as error:
-            self._missing = error  # told if it stays so
-            return
-        expect(len(self.joints.times) < MOST, self.file, f"at most {MOST} joint states")
-        time = reading.nanoseconds(message)
-        self.joints.add(time, q)
-        if len(message.velocity) == len(message.name) and np.isfinite(message.velocity).all():
-            self.rates.add(time, np.array([reading.rates(message).get(name, np.nan) for name in self._own]))
-
-    def _configurations(self) -> tuple[Integers, Array, Array | None]:
-        robot, mobile = self.robot, bool(self.robot.platform.n_p)
-        counted = self.odometry if self.odometry.times else self.moved
-        world = self.map if self.map.times else counted
-        if self._own and not self.joints.times:
-            if self._missing is not None:
-                raise self._missing.at(self.file)
-            raise InputError(f"has no joint of {robot.name}", where=self.file, available=self._own)
-        if mobile and not world.times:
-            what = f"no transforms from map or odom to {self.base}, and no odometry"
-            raise InputError(what, where=self.file, expected="base= or another topic")
-        times, q = self.joints.sorted() if self._own else (world.sorted()[0], None)
-        if q is None:
-            q = np.zeros((len(times), robot.n))
-        believed = None
-        if mobile:
-            first, last = min(world.times), max(world.times)
-            within = (times >= first) & (times <= last)
-            expect(within.any(), self.file, "joint states while the platform's pose is known")
-            times, q = times[within], q[within]
-            q[:, :3] = _between(times, *world.sorted())
-            if world is self.map and counted.times:
-                believed = q.copy()
-                believed[:, :3] = _between(times, *counted.sorted())
-                turns = np.round((q[0, 2] - believed[0, 2]) / (2 * np.pi))
-                believed[:, 2] += 2 * np.pi * turns
-        return times, q, believed
-
-    def _inputs(self, times: Integers, q: Array) -> Array:
-        robot = self.robot
-        if self.inputs.times:
-            return _between(times, *self.inputs.sorted(), turns=False)
+    def _inputs(self, world: Route | None, counted: Route | None) -> Array:
+        robot, times, recorded = self.robot, self.times, self.recorded
+        if len(recorded.inputs):
+            return recorded.inputs.between(times)
         if len(times) == 1:
             return np.zeros((1, robot.n_u))
-        q_dot = np.gradient(q, times / 1e9, axis=0)
-        rates = self.rates.sorted() if self.rates.times else None
-        if self._own and rates is not None and np.isfinite(rates[1]).all():
-            signs = np.array([-1.0 if name in robot.reversed_joints else 1.0 for name in self._own])
-            q_dot[:, robot.n - len(self._own) :] = signs * _between(times, *rates, turns=False)
-        if self.twists.times and robot.platform.n_p:
-            vx, vy, omega = _between(times, *self.twists.sorted(), turns=False).T
-            c, s = np.cos(q[:, 2]), np.sin(q[:, 2])
-            q_dot[:, :3] = np.column_stack([c * vx - s * vy, s * vx + c * vy, omega])
-        pairs = zip(q, q_dot, strict=True)
-        return np.array([np.linalg.lstsq(robot.S(at), rate, rcond=None)[0] for at, rate in pairs])
+        t = (times - times[0]) / 1e9
+        q_dot = by_differences(t, self.q, np.zeros(len(times) - 1, dtype=bool))
+        contradicted: dict[bool, list[str]] = {}
+        for i, name in enumerate(recorded.own, robot.n - len(recorded.own)):
+            if name in recorded.velocities and name in recorded.positions:
+                position, velocity = recorded.position(name), recorded.velocities[name]
+                stamps, values = position.sorted()
+                if contradict(stamps, values, velocity.between(stamps)):
+                    zero = not np.any(velocity.rows)
+                    contradicted.setdefault(zero, []).append(name)
+                else:
+                    sign = -1.0 if name in robot.reversed_joints else 1.0
+                    q_dot[:, i] = sign * velocity.between(times)[:, 0]
+        if world is not None:
+            q_dot[:, :3] = self._platform_rates(counted or world, t, contradicted)
+        self.findings += [
+            Finding("rates_contradict", {"names": names, "zero": zero})
+            for zero, names in contradicted.items()
+        ]
+        return np.array([
+            np.linalg.lstsq(robot.S(at), rate, rcond=None)[0] for at, rate in zip(self.q, q_dot, strict=True)
+        ])  # fmt: skip
+
+    def _platform_rates(self, route: Route, t: Array, contradicted: dict[bool, list[str]]) -> Array:
+        """Rates (N, 3) of x, y, theta: of the twists, or by differences of what counts the motion, which no
+        localisation corrects."""
+        twists, pose = self.recorded.twists, route.base(self.times)
+        if len(twists) and not self._contradicts(route):
+            return along(twists.between(self.times), self.q[:, 2])
+        if len(twists):
+            told = f"the twist of {self.recorded.odometry_topic}"
+            contradicted.setdefault(not np.any(twists.rows), []).append(told)
+        rates = by_differences(t, pose, route.breaks(self.times))
+        return along(rates, self.q[:, 2] - pose[:, 2])
+
+    def _contradicts(self, route: Route) -> bool:
+        """Whether the twists are not those of the poses."""
+        stamps, twists = self.recorded.twists.sorted()
+        first, last = route.span()
+        within = (stamps >= first) & (stamps <= last)
+        stamps, twists = stamps[within], twists[within]
+        if len(stamps) < 3:
+            return False
+        pose = route.base(stamps)
+        rates = along(twists, pose[:, 2])
+        parts = np.split(np.arange(len(stamps)), np.flatnonzero(route.breaks(stamps)) + 1)
+        return any(
+            contradict(stamps[part], pose[part][:, some], rates[part][:, some])
+            for part in parts
+            for some in ([0, 1], [2])
+        )
 
 
-def _between(times: Integers, given: Integers, rows: Array, turns: bool = True) -> Array:
-    """Rows (N, k) at given times, ns, linear in between at the times; `turns`: the third is an angle."""
-    if turns:
-        rows = rows.copy()
-        rows[:, 2] = np.unwrap(rows[:, 2])
-    start = given[0]
-    return interpolated((times - start) / 1e9, (given - start) / 1e9, rows)
+def along(rates: Array, angle: Array) -> Array:
+    """Velocities (N, 3) of x, y and theta on axes turned by -angle (N,)."""
+    c, s = np.cos(angle), np.sin(angle)
+    vx, vy, omega = rates.T
+    return np.column_stack([c * vx - s * vy, s * vx + c * vy, omega])

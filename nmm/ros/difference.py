@@ -28,15 +28,14 @@ def difference(run: Trajectory, bag: Trajectory) -> Mapping[str, Any]:
     within = since <= after[-1] + 1e-9
     t = since[within]
     planned, moved = run.q[within], interpolated(t, after, bag.q)
-    off = moved - planned
+    off = robot.short_way(moved - planned)
     values: dict[str, Array] = {}
     n_p = robot.platform.n_p
     if n_p:
         values["platform"] = np.hypot(off[:, 0], off[:, 1])
-        values["theta"] = np.remainder(off[:, 2] + np.pi, 2 * np.pi) - np.pi
+        values["theta"] = off[:, 2]
     for i, name in enumerate(robot.q_names[min(3, n_p) :], min(3, n_p)):
-        turning = robot.q_units[i] == "rad" and not robot.limited[i].any()
-        values[name] = np.remainder(off[:, i] + np.pi, 2 * np.pi) - np.pi if turning else off[:, i]
+        values[name] = off[:, i]
     if run.frame is not None:
         there = _places(run, run.frame, moved) - _places(run, run.frame, planned)
         values[run.frame] = np.asarray(np.linalg.norm(there, axis=1))

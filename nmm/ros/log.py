@@ -8,23 +8,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pinocchio as pin
 
 from nmm.arrays import Array, scalar
-from nmm.errors import InputError, RobotError, expect
+from nmm.errors import InputError, expect, few
 from nmm.files import replaceable, whole_file, written_at
-from nmm.playback.placements import Placements, position_and_quaternion, rolling_joints
+from nmm.playback.placements import position_and_quaternion, rolling_joints
 from nmm.playback.rolling import Rolling
-from nmm.robots.loading.description import describe
-from nmm.robots.loading.source import source_path
-from nmm.ros.making import Messages, base_joint, planar_pose
+from nmm.robots.configuration import Configuration
+from nmm.ros.description import description
+from nmm.ros.links import Links
+from nmm.ros.making import Messages
 
 if TYPE_CHECKING:
-    from nmm.robots.robot import Robot
     from nmm.runs.trajectory import Trajectory
 
 JOINTS, INPUTS, ODOMETRY, TWIST, ERROR = "/joint_states", "/inputs", "/odom", "/cmd_vel", "/error"
 TF, TF_STATIC, EVENTS, DESCRIPTION = "/tf", "/tf_static", "/rosout", "/robot_description"
 PATH, DESIRED = "/path", "/desired_path"
+BASE_POSE, FRAME_POSE, DESIRED_POSE = "/base_pose", "/end_effector_pose", "/desired_pose"
 #: Topics whose last message is for whoever comes later.
 LATCHED = (TF_STATIC, DESCRIPTION, PATH, DESIRED)
 MAP = "map"
@@ -58,7 +60,9 @@ def save_mcap(trajectory: Trajectory, path: str | Path, start: float = 0.0) -> P
     expect(made.nanoseconds(trajectory.t[0]) >= 0, "start", "a time at which no sample is before 1970", start)
     with written_at(file), whole_file(file) as temporary:
         folder = temporary.with_name("bag")
-        with writing.Writer(folder, version=9, storage_plugin=writing.StoragePlugin.MCAP) as bag:
+        bag = writing.Writer(folder, version=9, storage_plugin=writing.StoragePlugin.MCAP)
+        bag.set_compression(writing.CompressionMode.STORAGE, writing.CompressionFormat.ZSTD)
+        with bag:
             topics: dict[str, Any] = {}
             for nanoseconds, topic, message in messages_of(trajectory, made):
                 kind = message.__msgtype__
@@ -79,13 +83,22 @@ def messages_of(trajectory: Trajectory, made: Messages) -> Iterator[Timed]:
     angles, wheels = rolling.angles(counted, run.u), rolling_joints(robot)
     begin = float(run.t[0])
     first = made.nanoseconds(begin)
-    if text := description(robot):
-        yield first, DESCRIPTION, made.text(text)
-    if links.fixed:
-        yield first, TF_STATIC, made.tf([(begin, *one) for one in links.fixed])
+    text, left_out = description(robot, links)
+    yield first, DESCRIPTION, made.text(text)
+    if left_out:
+        words = f"shapes that a URDF has no words for are not drawn: {few(left_out)}"
+        yield first, EVENTS, made.log(begin, DESCRIPTION, words)
+    # x and y count from the ground's frame, which the log calls odom, or map: a root may stand elsewhere.
+    ground = robot.model.jointPlacements[1].inverse() if robot.platform.n_p else pin.SE3.Identity()
+    still = [
+        (world, name, *position_and_quaternion((ground * place).homogeneous)) for name, place in links.ground
+    ]
+    if still := [*links.fixed, *still]:
+        yield first, TF_STATIC, made.tf([(begin, *one) for one in still])
     for topic, points in ((PATH, run.path), (DESIRED, run.moving)):
         if points is not None and len(points):
-            yield first, topic, made.path(begin, points, world)
+            yield first, topic, made.path(begin, [ground.act(point) for point in points], world)
+    posed = run.frame is not None and run.frame in robot.frames
     events = sorted(run.events, key=lambda event: event.t)
     for k, t in enumerate(run.t.tolist()):
         while events and (events[0].t <= t or k == len(run) - 1):
@@ -98,11 +111,18 @@ def messages_of(trajectory: Trajectory, made: Messages) -> Iterator[Timed]:
         turned = dict(zip(wheels, zip(angles[k], spins, strict=True), strict=True))
         yield now, JOINTS, made.joint_state(t, q, q_dot, turned)
         yield now, ODOMETRY, made.odometry(t, seen, q_dot)
+        stand = planar_matrix(seen if robot.platform.n_p else np.zeros(3))
+        yield now, BASE_POSE, made.pose(t, stand)
+        if posed:
+            reached = ground * Configuration(robot, q).placement(str(run.frame))
+            yield now, FRAME_POSE, made.pose(t, reached.homogeneous, world)
+        if run.desired is not None and np.isfinite(run.desired[k]).all():
+            wanted = pin.SE3(np.eye(3), ground.act(run.desired[k]))
+            yield now, DESIRED_POSE, made.pose(t, wanted.homogeneous, world)
         moved = [(t, *one) for one in links.moving(q, angles[k])]
-        place = planar_pose(seen[:3] if robot.platform.n_p else np.zeros(3))
-        frames = [(t, made.odom, made.base, *place)]
+        frames = [(t, made.odom, made.base, *position_and_quaternion(stand))]
         if run.believed is not None:
-            off = planar_matrix(q) @ np.linalg.inv(planar_matrix(seen))
+            off = planar_matrix(q) @ np.linalg.inv(stand)
             frames.append((t, MAP, made.odom, *position_and_quaternion(off)))
         yield now, TF, made.tf([*frames, *moved])
         yield now, TWIST, made.twist_stamped(t, seen, u)
@@ -116,56 +136,6 @@ def planar_matrix(q: Array) -> Array:
     x, y, theta = q[:3]
     c, s = np.cos(theta), np.sin(theta)
     return np.array([[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, 0], [0, 0, 0, 1]], dtype=np.float64)
-
-
-class Links:
-    """Where a robot's links are in one another, as transforms: (parent, child, position, quaternion).
-
-    fixed : those that do not move
-    """
-
-    def __init__(self, robot: Robot, base: str) -> None:
-        self._placements = Placements(robot)
-        model, root = robot.display_model, base_joint(robot)
-        frames = [one for one in model.frames if one.type.name == "BODY" and one.name != "universe"]
-        self._names, self._places = {root: base}, {root: np.eye(4)}
-        for frame in frames:
-            if frame.parentJoint > root and frame.parentJoint not in self._names:
-                self._names[frame.parentJoint] = frame.name
-                self._places[frame.parentJoint] = frame.placement.homogeneous
-        for joint in range(root + 1, model.njoints):
-            self._names.setdefault(joint, str(model.names[joint]))
-            self._places.setdefault(joint, np.eye(4))
-        self._parents = {joint: int(model.parents[joint]) for joint in self._names if joint > root}
-        self.fixed = [
-            self._transform(
-                frame.parentJoint, frame.name, np.linalg.inv(self._places[frame.parentJoint]) @ placement
-            )
-            for frame in frames
-            if frame.parentJoint in self._names and frame.name != self._names[frame.parentJoint]
-            for placement in [frame.placement.homogeneous]
-        ]
-
-    def moving(self, q: Array, wheels: Array) -> list[tuple[str, str, Array, Array]]:
-        """Those of links on joints, at q (n,) and the wheels' angles (D,)."""
-        relative, places = self._placements.relative(q, wheels), self._places
-        return [
-            self._transform(
-                parent, self._names[j], np.linalg.inv(places[parent]) @ relative[j - 1] @ places[j]
-            )
-            for j, parent in self._parents.items()
-        ]
-
-    def _transform(self, parent: int, child: str, placement: Array) -> tuple[str, str, Array, Array]:
-        return (self._names[parent], child, *position_and_quaternion(placement))
-
-
-def description(robot: Robot) -> str:
-    """The URDF text of a robot that is one file's; "" of others."""
-    try:
-        return describe(source_path(robot.source, ()), robot.arguments).xml
-    except RobotError:
-        return ""
 
 
 def _latched(interfaces: Any) -> Any:

@@ -99,26 +99,23 @@ class Messages:
         self, t: float, q: ArrayLike, q_dot: ArrayLike | None = None, covariance: ArrayLike | None = None
     ) -> Any:
         """An Odometry at t, s, of the platform at q (n,): pose in odom, twist along the base's axes, zero
-        without q_dot (n,); the covariance (3, 3) of x, y, theta."""
-        q = self.robot.q(q)
-        spread = np.zeros((6, 6))
+        without q_dot (n,); the covariance (3, 3) of x, y, theta. One that is not known begins with -1, as
+        sensor_msgs/Imu says it: zeros would be exact to a filter. That of the twist is never known."""
+        q, unknown = self.robot.q(q), np.zeros((6, 6))
+        unknown[0, 0] = -1.0
+        spread = unknown if covariance is None else np.zeros((6, 6))
         if covariance is not None:
             spread[np.ix_([0, 1, 5], [0, 1, 5])] = matrix(covariance, (3, 3), "covariance")
         velocity = np.zeros(3) if q_dot is None else body_twist(q, vector(q_dot, self.robot.n, "q_dot"))
-        none, pose = (
-            self._floats(np.zeros(36)),
-            self._pose(*planar_pose(q[:3] if self._first else np.zeros(3))),
-        )
+        pose = self._pose(*planar_pose(q[:3] if self._first else np.zeros(3)))
+        covariances = [self._floats(one.ravel()) for one in (spread, unknown)]
+        kinds = [f"geometry_msgs/msg/{one}WithCovariance" for one in ("Pose", "Twist")]
         return self._made(
             "nav_msgs/msg/Odometry",
             header=self._header(t, self.odom),
             child_frame_id=self.base,
-            pose=self._made(
-                "geometry_msgs/msg/PoseWithCovariance", pose=pose, covariance=self._floats(spread.ravel())
-            ),
-            twist=self._made(
-                "geometry_msgs/msg/TwistWithCovariance", twist=self._twist(velocity), covariance=none
-            ),
+            pose=self._made(kinds[0], pose=pose, covariance=covariances[0]),
+            twist=self._made(kinds[1], twist=self._twist(velocity), covariance=covariances[1]),
         )
 
     def transforms(self, t: float, q: ArrayLike) -> Any:
@@ -279,11 +276,13 @@ def in_nanoseconds(t: float) -> int:
 
 def root_link(robot: Robot) -> str:
     """The link at the platform's reference point, or "reference_point" where no link is; of a fixed base the
-    link at its root."""
-    base = base_joint(robot)
-    links = (frame for frame in robot.model.frames if frame.parentJoint == base and frame.type.name == "BODY")
-    at_rest = (link.name for link in links if link.placement.isIdentity(1e-9) and link.name != "universe")
-    return next(at_rest, "reference_point")
+    link at its root, of a base of joints the one that they move."""
+    base, frames = base_joint(robot), robot.model.frames
+    links = (frame for frame in frames if frame.parentJoint == base and frame.type.name == "BODY")
+    at_rest = [link for link in links if link.placement.isIdentity(1e-9) and link.name != "universe"]
+    moved = [note.values["names"][-1] for note in robot.notes if note.code == "base_of_joints"]
+    carried = (link.name for link in at_rest if frames[link.parentFrame].name in moved)
+    return next(carried, at_rest[0].name if at_rest else "reference_point")
 
 
 def base_joint(robot: Robot) -> int:

@@ -39,12 +39,12 @@ def nanoseconds(message: Any) -> int:
     first = next(iter(getattr(message, "transforms", ())), message)
     time = first if hasattr(first, "sec") else getattr(getattr(first, "header", first), "stamp", None)
     if time is None:
-        raise InputError(where=_name(message), expected="a message with a header: it says no time")
+        raise InputError(where=name_of(message), expected="a message with a header: it says no time")
     return int(time.sec) * 1_000_000_000 + int(time.nanosec)
 
 
 def joints(message: Any) -> dict[str, float]:
-    """Positions of a JointState by joint, rad or m, for `Robot.q_from`.
+    """Positions of a JointState by joint, rad or m, for `Robot.q_from`; empty where it has velocities alone.
 
     Raises
     ------
@@ -56,7 +56,9 @@ def joints(message: Any) -> dict[str, float]:
     >>> nmm.ros.joints(Message(name=["q2", "q1"], position=[0.5, 0.1], velocity=[]))
     {'q2': 0.5, 'q1': 0.1}
     """
-    return _by_name(message, "position")
+    _field(message, "name")
+    others = len(getattr(message, "velocity", ())) or len(getattr(message, "effort", ()))
+    return {} if others and not len(message.position) else _by_name(message, "position")
 
 
 def rates(message: Any) -> dict[str, float]:
@@ -87,7 +89,7 @@ def placement(message: Any) -> Array:
     >>> nmm.ros.placement(pose)[:3, 3], nmm.ros.base(pose).round(3)
     (array([1., 2., 0.]), array([1.   , 2.   , 3.142]))
     """
-    where, part = _name(message), message
+    where, part = name_of(message), message
     while (inner := getattr(part, "pose", None) or getattr(part, "transform", None)) is not None:
         part = inner
     at = getattr(part, "position", None) or getattr(part, "translation", None)
@@ -128,12 +130,12 @@ def base(message: Any, frame: str | None = None, child: str | None = None) -> Ar
         ...
     nmm.errors.InputError: SimpleNamespace: header.frame_id: expected 'map', got 'odom'
     """
-    where, header = _name(message), getattr(message, "header", None)
+    where, header = name_of(message), getattr(message, "header", None)
     given, about = getattr(header, "frame_id", None), getattr(message, "child_frame_id", None)
     if frame is not None and given is not None:
-        expect(_plain(given) == _plain(frame), f"{where}: header.frame_id", f"{frame!r}", given)
+        expect(plain(given) == plain(frame), f"{where}: header.frame_id", f"{frame!r}", given)
     if child is not None and about is not None:
-        expect(_plain(about) == _plain(child), f"{where}: child_frame_id", f"{child!r}", about)
+        expect(plain(about) == plain(child), f"{where}: child_frame_id", f"{child!r}", about)
     return planar(placement(message), where)
 
 
@@ -142,6 +144,13 @@ def planar(pose: Array, where: str) -> Array:
     leans = math.acos(min(1.0, max(-1.0, float(pose[2, 2]))))
     expect(leans <= TILT, f"{where}: orientation", f"a platform on level ground (within {TILT} rad)", leans)
     return np.array([pose[0, 3], pose[1, 3], math.atan2(pose[1, 0], pose[0, 0])])
+
+
+def planar_rows(poses: Array, where: str) -> Array:
+    """The same of poses (N, 4, 4): (N, 3)."""
+    lowest = int(np.argmin(poses[:, 2, 2]))
+    planar(poses[lowest], where)
+    return np.column_stack([poses[:, :2, 3], np.arctan2(poses[:, 1, 0], poses[:, 0, 0])])
 
 
 def twist(message: Any) -> Array:
@@ -158,13 +167,19 @@ def twist(message: Any) -> Array:
     >>> nmm.ros.twist(M(linear=M(x=0.5, y=0.0, z=0.0), angular=M(x=0.0, y=0.0, z=0.2)))
     array([0.5, 0. , 0.2])
     """
+    linear, angular = velocities(message)
+    return vector([linear[0], linear[1], angular[2]], 3, f"{name_of(message)}: twist")
+
+
+def velocities(message: Any) -> tuple[Array, Array]:
+    """The linear (3,) and angular (3,) velocity of a message with a twist, whatever they are."""
     part = message
     while (inner := getattr(part, "twist", None)) is not None:
         part = inner
     linear, angular = getattr(part, "linear", None), getattr(part, "angular", None)
     if linear is None or angular is None:
-        raise InputError(where=_name(message), expected="a message with a twist")
-    return vector([linear.x, linear.y, angular.z], 3, f"{_name(message)}: twist")
+        raise InputError(where=name_of(message), expected="a message with a twist")
+    return np.array([linear.x, linear.y, linear.z]), np.array([angular.x, angular.y, angular.z])
 
 
 def inputs(robot: Robot, q: ArrayLike, velocity: ArrayLike, joint_rates: Mapping[str, float]) -> Array:
@@ -215,7 +230,7 @@ def joint_trajectory(message: Any) -> tuple[Array, dict[str, Array]]:
     >>> nmm.ros.joint_trajectory(message)
     (array([0., 1.]), {'q1': array([0. , 0.5]), 'q2': array([0., 0.])})
     """
-    where, names, points = _name(message), [*message.joint_names], [*message.points]
+    where, names, points = name_of(message), [*message.joint_names], [*message.points]
     expect(points, where, "at least one point")
     expect(len({*names}) == len(names), f"{where}: joint_names", "each joint once", names)
     times = np.array([nanoseconds(one.time_from_start) / 1e9 for one in points])
@@ -227,58 +242,8 @@ def joint_trajectory(message: Any) -> tuple[Array, dict[str, Array]]:
     return times, dict(zip(names, np.array(rows).T, strict=True))
 
 
-class Transforms:
-    """The newest transforms of /tf and /tf_static, which lead from frame to frame.
-
-    Examples
-    --------
-    >>> from rosbags.typesys import Stores, get_typestore
-    >>> types = get_typestore(Stores.ROS2_HUMBLE).types
-    >>> frames = nmm.ros.Transforms()
-    >>> message = nmm.ros.Messages(nmm.load("unicycle_2r"), types).transforms(0.0, [1, 2, 0.5, 0, 0])
-    >>> frames.add(message)
-    >>> frames.base("odom", "base_footprint").round(3)
-    array([1. , 2. , 0.5])
-    """
-
-    def __init__(self) -> None:
-        self._parents: dict[str, tuple[str, Array]] = {}
-
-    def add(self, message: Any) -> None:
-        """Take over a TFMessage; `InputError` as of `placement`, with nothing taken over."""
-        found = [(_plain(one.child_frame_id), (_plain(one.header.frame_id), placement(one)))
-                 for one in _field(message, "transforms")]  # fmt: skip
-        self._parents.update(found)
-
-    def placement(self, frame: str, child: str) -> Array:
-        """The pose (4, 4) of `child` in `frame`, m; `InputError` where no transforms connect them."""
-        first, second = self._chain(_plain(frame)), self._chain(_plain(child))
-        if not self.connects(frame, child):
-            known = sorted({*self._parents, *(parent for parent, _ in self._parents.values())})
-            raise InputError("no transforms connect them", where=f"{frame} and {child}", available=known)
-        return np.asarray(np.linalg.inv([*first.values()][-1]) @ [*second.values()][-1])
-
-    def connects(self, frame: str, child: str) -> bool:
-        """Whether there are transforms from the one to the other."""
-        return [*self._chain(_plain(frame))][-1] == [*self._chain(_plain(child))][-1]
-
-    def base(self, frame: str, child: str) -> Array:
-        """x, y, theta (3,) of `child` in `frame`, as of `nmm.ros.base`."""
-        return planar(self.placement(frame, child), f"{child} in {frame}")
-
-    def _chain(self, frame: str) -> dict[str, Array]:
-        """The frames above a frame, and its pose in each."""
-        found = {frame: np.eye(4)}
-        while frame in self._parents:
-            parent, pose = self._parents[frame]
-            expect(parent not in found, f"frame {frame}", "a tree of frames, this is a circle", parent)
-            found[parent] = pose @ found[frame]
-            frame = parent
-        return found
-
-
 def _by_name(message: Any, part: str) -> dict[str, float]:
-    where, names = _name(message), [*_field(message, "name")]
+    where, names = name_of(message), [*_field(message, "name")]
     values = _field(message, part)
     expect(len({*names}) == len(names), f"{where}: name", "each joint once", names)
     expect(
@@ -291,14 +256,15 @@ def _by_name(message: Any, part: str) -> dict[str, float]:
 
 def _field(message: Any, name: str) -> Sequence[Any]:
     if not hasattr(message, name):
-        raise InputError(where=_name(message), expected=f"a message with the field {name}")
+        raise InputError(where=name_of(message), expected=f"a message with the field {name}")
     found: Sequence[Any] = getattr(message, name)
     return found
 
 
-def _name(message: Any) -> str:
+def name_of(message: Any) -> str:
     return str(getattr(message, "__msgtype__", type(message).__name__))
 
 
-def _plain(frame: str) -> str:
+def plain(frame: str) -> str:
+    """A frame's name as ROS 2 writes it: that of ROS 1 may begin with a slash."""
     return frame.lstrip("/")

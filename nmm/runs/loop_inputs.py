@@ -55,8 +55,8 @@ class LoopInputs:
         except Exception:
             self.u = np.full_like(earlier, np.nan)
         if not np.isfinite(self.u).all():
-            change = self._solver.limits_on.accelerations * self._period
-            self._write(earlier - np.clip(earlier, -change, change), q)
+            least, most = self._solver.limits_on.changes.T * self._period
+            self._write(earlier + np.clip(-earlier, least, most), q)
 
     def _write(self, u: Array, q: Array) -> None:
         """u (m,) in place of the solver's."""

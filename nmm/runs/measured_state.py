@@ -56,6 +56,7 @@ class MeasuredState:
         lengths = unit_codes(robot.q_units) == METRES
         self._off = np.where(lengths, tolerances.metres, tolerances.radians)
         self._platform = robot.platform.n_p
+        self._full = 2.0 * math.pi * robot.endless
         self.q = robot.rest
         self.forget()
 
@@ -111,8 +112,8 @@ class MeasuredState:
             return (Refused.REPEATED if at == self._stamp else Refused.OUT_OF_ORDER), None
         if at < now - self._tolerances.watchdog:
             return Refused.OLD, None
-        if self._platform >= 3 and self.at > -math.inf:  # sensors wrap θ, q does not
-            read[2] += 2.0 * math.pi * round((self.q[2] - read[2]) / (2.0 * math.pi))
+        if self.at > -math.inf:  # sensors wrap angles, q does not
+            read += self._full * np.round((self.q - read) / (2.0 * math.pi))
         return None, read
 
     def _stands_still(self, read: Array, earlier: float, at: float) -> bool:

@@ -62,9 +62,11 @@ def residuals(t: Array, residual: Array, rate: Array) -> Residuals:
     return Residuals(len(found), len(found) / len(t), largest, relative, float(t[k]))
 
 
-def run_up(t: Array, u: Array, accelerations: Array, dt: float) -> int:
+def run_up(t: Array, u: Array, changes: Array, dt: float) -> int:
     """Number of samples that a run from rest, u (N, m) at t (N,), the first dt from rest, spends accelerating
-    at the limits (m,); shortfalls then are by design."""
-    most = np.append(dt, np.diff(t))[:, np.newaxis] * accelerations
-    fast = np.any(np.abs(np.diff(u, axis=0, prepend=0.0)) >= most * (1.0 - 1e-6), axis=1)
+    at the limits (m, 2); shortfalls then are by design."""
+    lasted = np.append(dt, np.diff(t))[:, np.newaxis] * (1.0 - 1e-6)
+    lower, upper = (lasted * ends for ends in changes.T)
+    changed = np.diff(u, axis=0, prepend=0.0)
+    fast = np.any((changed <= lower) | (changed >= upper), axis=1)
     return len(t) if fast.all() else int(np.argmin(fast))

@@ -11,6 +11,7 @@ import numpy as np
 from nmm.control.quantities import placed
 from nmm.errors import RunError
 from nmm.findings.run import MOTORS
+from nmm.text_format import apart
 
 if TYPE_CHECKING:
     from nmm.control.controller import Controller
@@ -29,8 +30,8 @@ def summary_rows(
         outcome += f", {trajectory.t[-1]:g} s in {len(trajectory)} samples"
     yield "outcome", outcome
     redundancy = numbers["redundancy"]
-    left = redundancy["kinematic"] or "none left"
-    yield "redundancy", f"kinematic {left}, static {redundancy['static']}"
+    left = max(redundancy["kinematic"], 0) or "none left"
+    yield "redundancy", f"kinematic {left}, static {max(redundancy['static'], 0)}"
     if not len(trajectory):
         return
     for row, (name, unit) in enumerate(zip(trajectory.r_names, trajectory.r_units, strict=True)):
@@ -70,12 +71,18 @@ def summary_rows(
         yield "least margin to a limit", f"{margin:.3g} % of its range{f' ({what})' if what else ''}"
     if fast := numbers.get("fast_wheels"):
         own = {wheel.joint: wheel.velocity for wheel in trajectory.robot.wheels}
-        rates = [f"{name} {rate:.3g} rad/s (at most {own[name]:.3g})" for name, rate in fast.items()]
+        rates = [
+            "{} {} rad/s (at most {})".format(name, *apart(rate, own[name], digits=3))
+            for name, rate in fast.items()
+        ]
         yield "wheels beyond their limits", ", ".join(rates)
     motors = [one for one in numbers["findings"] if one["line"] == MOTORS]
     if over := [one["values"] for one in motors if one["code"] == "effort_exceeded"]:
         efforts = [
-            f"{one['actuator']} {one['peak']:.3g} {one['unit']} (at most {one['effort']:.3g})" for one in over
+            "{0} {2} {1} (at most {3})".format(
+                one["actuator"], one["unit"], *apart(one["peak"], one["effort"], digits=3)
+            )
+            for one in over
         ]
         yield "motors beyond their limits", ", ".join(efforts)
     yield from (("balance", one["text"]) for one in motors if one["code"] == "tips")

@@ -269,7 +269,7 @@ class Trajectory:
 
     def save_mcap(self, path: str | Path, start: float = 0.0) -> Path:
         """Write the motion as a log of ROS 2's messages (.mcap), for Foxglove, Rerun and `ros2 bag`: joint
-        states, TF, odometry, twist, inputs, task error, paths, events, the robot's description
+        states, TF, odometry, poses, twist, inputs, task error, paths, events, the whole robot's description
         (docs/ros.md). `start`: the clock's time of t = 0, s.
 
         Raises

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,6 +12,7 @@ import numpy as np
 from nmm.arrays import Array
 from nmm.dynamics.torques import Torques, torques_along
 from nmm.errors import InputError
+from nmm.robots.loading.provenance import accelerations_of
 from nmm.robots.robot import Robot
 
 #: Of a point of the base and of a slide, m/s²; of joints, steering and the base, rad/s².
@@ -38,20 +40,25 @@ class Standing:
         return self._moved(q)[0]
 
     def accelerations(self, q: Array, share: float = 1.0) -> dict[str, float]:
-        """Largest accelerations by input, m/s² and rad/s²: usual ones, or at q half of what tips the robot,
-        each alone; times a share of 1 or less. "arm" is of all joints, slides by their own names aside."""
+        """Largest accelerations by input, m/s² and rad/s²: the file's or usual ones, or at q half of
+        what tips the robot, each alone; times a share of 1 or less. "arm" is of all joints, slides by their own names aside."""
         margin, shifts = self._moved(q)
-        robot, p = self.robot, self.robot.platform.p
+        robot, p, of_file = self.robot, self.robot.platform.p, accelerations_of(self.robot)
         usual = np.array([*self._of_platform(q), *self._of_joints()])
+        usual = np.array([of_file.get(name, one) for name, one in zip(robot.u_names, usual, strict=True)])
         with np.errstate(divide="ignore", invalid="ignore"):
             tipping = np.where(shifts > 0.0, max(margin, 0.0) / (_SAFE * shifts), np.inf)
         most = share * np.where(margin > 0.0, np.minimum(usual, tipping), usual)
         found = dict(zip(robot.u_names[:p], most[:p], strict=True))
-        turning = [j for j in range(p, robot.n_u) if robot.u_units[j] == "rad/s"]
+        own = [robot.u_names.index(name) for name in of_file if robot.u_names.index(name) >= p]
+        turning = [j for j in range(p, robot.n_u) if robot.u_units[j] == "rad/s" and j not in own]
         if turning:
             found["arm"] = min(most[turning])
         found |= {robot.u_names[j]: most[j] for j in range(p, robot.n_u) if j not in turning}
-        return {name: float(f"{value:.2g}") for name, value in found.items()}
+        return {
+            name: float(value) if of_file.get(name) == value else _rounded_down(float(value))
+            for name, value in found.items()
+        }
 
     def _of_platform(self, q: Array) -> Array:
         """Usual accelerations of its inputs (p,): of a point of its body by 1 m/s²."""
@@ -88,6 +95,12 @@ class Standing:
             return margin, np.zeros(m)
         shifts = np.linalg.norm(there.zero_moment[1:] - there.zero_moment[0], axis=1)
         return margin, np.where(np.isfinite(shifts), shifts, 0.0)
+
+
+def _rounded_down(value: float) -> float:
+    """To two digits."""
+    digits = 1 - math.floor(math.log10(value))
+    return float(f"{math.floor(value * 10.0**digits + 1e-9) / 10.0**digits:.2g}")
 
 
 def tipping(torques: Torques) -> Mapping[str, float] | None:

@@ -19,6 +19,8 @@ from nmm.scenario.short_task import moving_axes
 
 #: A J whose least singular value is below this, per metre of arm, is near a singularity.
 REGULAR = 0.03
+#: No arm is longer, m, but what slides far on a gantry.
+_LONGEST = 5.0
 #: A joint nearer to a limit than this share of its range counts less, and at a limit not at all.
 _ROOM = 0.15
 #: Of a configuration whose end-effector is beside or behind the axle, or at the ground, this much counts.
@@ -81,7 +83,7 @@ class _Look:
 
     def at(self, q: Array) -> _Seen:
         here = Configuration(self.robot, q)
-        J = here.jacobian(self.hand.frame)[:3] @ here.S / self.robot.reach
+        J = here.jacobian(self.hand.frame)[:3] @ here.S / min(self.robot.reach, _LONGEST)
         return _Seen(q, np.array(here.placement(self.hand.frame).translation), J)
 
     def worth(self, seen: _Seen, axes: str) -> float:
@@ -132,7 +134,8 @@ def _posture(look: _Look, axes: str) -> Start | None:
         except InputError:
             continue
         if look.at(q).sigma(axes, look.all) >= REGULAR and look.standing.margin(q) > 0.0:
-            return Start(q, {POSTURE: name}, axes, "a posture of the robot's SRDF")
+            where = "SRDF" if robot.semantics.files else "file"
+            return Start(q, {POSTURE: name}, axes, f"a posture of the robot's {where}")
     return None
 
 

@@ -15,7 +15,7 @@ from nmm.robots.robot import Robot
 from nmm.scenario.constructors import FunctionPart, MadePart, keys_of
 from nmm.scenario.functions import with_functions
 from nmm.scenario.keys import OneOf, Part, each
-from nmm.scenario.numbers import Number, Numbers, Positive, Speeds, Whole, nested
+from nmm.scenario.numbers import Nested, Number, Numbers, Positive, Speeds, Whole, nested
 
 
 class BoundPart(FunctionPart):
@@ -57,11 +57,22 @@ def _ranges(value: object) -> object:
     raise InputError(expected="true, false, or numbers by name", got=value)
 
 
+def _changes(value: object) -> object:
+    if isinstance(value, Mapping):
+        return {str(name): nested(item) for name, item in value.items()}
+    if isinstance(value, bool):
+        raise InputError(expected="a number, or numbers by name", got=value)
+    return None if value is None else nested(value)
+
+
+#: A number or [lower, upper], for all or by name.
+Changes = Annotated[Nested | dict[str, Nested] | None, BeforeValidator(_changes)]
+
 Ranges = Annotated[bool | dict[str, Any], BeforeValidator(_ranges)]
 
 
 class LimitsPart(
-    keys_of(Limits, MadePart, "bounds", velocity=Ranges, position=Ranges, acceleration=Speeds, wheels=Speeds)  # type: ignore[misc]  # made
+    keys_of(Limits, MadePart, "bounds", velocity=Ranges, position=Ranges, acceleration=Changes, wheels=Speeds)  # type: ignore[misc]  # made
 ):
     """What the inputs are kept within; `limits: true` is this with its defaults, as the robot's file says."""
 

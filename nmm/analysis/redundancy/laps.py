@@ -84,9 +84,10 @@ class Laps:
 
     @property
     def turns(self) -> Integers:
-        """(K, n): full turns of each lap, counted where one is the same posture: of angles without limits."""
-        free = ~self.robot.limited.any(axis=1) & (np.array(self.robot.q_units) == "rad")
-        return np.where(free, np.round(self.drift / (2.0 * np.pi)), 0.0).astype(np.int64)
+        """(K, n): full turns of each lap, counted where one is the same posture (`Robot.continuous`)."""
+        robot = self.robot
+        turned = np.round(self.drift[:, robot.own_or_leader] / (2.0 * np.pi))
+        return (turned * robot.turns()).astype(np.int64)
 
     @property
     def posture_drift(self) -> Array:

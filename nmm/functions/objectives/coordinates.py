@@ -161,7 +161,7 @@ class PreferredPosture(Objective):
         weights = self.weights
         terms = [QuadraticTerm(name, goal, weights.get(name, 1.0)) for name, goal in self.posture.items()]
         indices = [robot.coordinate(name) for name in self.posture]
-        wraps = [robot.q_units[i] == "rad" and not robot.limited[i].any() for i in indices]
+        wraps = [bool(robot.endless[i]) for i in indices]
         return quadratic_stages(terms, robot, wraps)
 
 

@@ -84,11 +84,13 @@ class LinearCoordinates(Function):
 
 
 class Posture(Function):
-    """The values of coordinates, rad and m, one component each; angles are not wrapped.
+    """The values of coordinates, rad and m, one component each. As a task θ and continuous joints go the
+    short way to their targets, at most half a turn, unless turns count or `Limits` bound them.
 
     Parameters
     ----------
     names : names of coordinates; by default all of the arm's that have an input
+    turns : whether full turns count: 0 and 2π are then two targets
 
     Examples
     --------
@@ -96,16 +98,23 @@ class Posture(Function):
     >>> here = nmm.Configuration(robot, robot.q({"q1": 0.2, "q2": 0.4}))
     >>> nmm.evaluate(nmm.Posture("q1", "q2"), 0.0, here).value
     array([0.2, 0.4])
+    >>> [[row.angular for row in one.rows(robot)] for one in (nmm.Posture("theta"), nmm.Posture("q1"))]
+    [[True], [False]]
     """
 
-    def __init__(self, *names: str) -> None:
+    def __init__(self, *names: str, turns: bool = False) -> None:
         for name in names:
             expect_kind(name, str, "posture", "names (Coordinates has sums)")
         expect(len(set(names)) == len(names), "posture", "each coordinate once", names)
-        self.names = names
+        expect_kind(turns, bool, "posture: turns", "true or false")
+        self.names, self.turns = names, turns
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        return self._coordinates(robot).rows(robot)
+        rows = self._coordinates(robot).rows(robot)
+        return tuple(
+            row._replace(angular=not self.turns and bool(robot.continuous[robot.coordinate(row.name)]))
+            for row in rows
+        )
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         return self._coordinates(robot).stages(robot)

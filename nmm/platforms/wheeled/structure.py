@@ -16,7 +16,7 @@ from nmm.platforms.wheeled.descriptions import MAIN, FixedWheel, SteeredWheel, W
 from nmm.platforms.wheeled.geometry import Bodies, Closure, Rate, Row, Velocity, axis_of
 from nmm.platforms.wheeled.inputs import Input, Named, read
 from nmm.platforms.wheeled.kernel import CONTRADICTION
-from nmm.text_format import listed
+from nmm.text_format import apart, listed
 
 #: Rows are dependent when a unit combination of them is smaller: files give angles and lengths rounded.
 DEPENDENT = 1e-4
@@ -93,9 +93,8 @@ class Structure:
         """The first hitch beyond its limits."""
         for angle, body in zip(qp[3:], self.bodies.all[1:], strict=True):
             if not body.steers and not body.lower - _SLACK <= angle <= body.upper + _SLACK:
-                angle, lower, upper = (math.degrees(value) for value in (angle, body.lower, body.upper))
-                beyond = f"beyond its limits {lower:.4g} and {upper:.4g}"
-                return f"{body.name} is folded to {angle:.4g} deg, {beyond}"
+                folded, lower, upper = apart(*np.degrees([angle, body.lower, body.upper]).tolist())
+                return f"{body.name} is folded to {folded} deg, beyond its limits {lower} and {upper}"
         return None
 
     def singularity(self, qp: Array) -> str:

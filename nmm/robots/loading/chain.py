@@ -53,15 +53,18 @@ def rebuild(
     root: pin.SE3 | None = None,
     head: Head = CHAIN_JOINTS,
     reversed_joints: Sequence[str] = (),
+    replaced: int | None = None,
 ) -> Rebuilt:
     """The robot on the chain x, y (prismatic, m), theta (revolute, rad), or on `head`, at zero where it was.
 
     The chain carries all of a fixed base, replaces a planar or free root (z, roll, pitch zero) or is there.
     Joints in `first` precede their siblings; `root` places the root link in the chain's last joint (or in the
-    world); `reversed_joints`, which only turn, get the opposite axis and sign. `RobotError` for a joint with
-    several degrees of freedom, or a name of the chain's."""
+    world); `reversed_joints`, which only turn, get the opposite axis and sign; `replaced` joints, if
+    x, y, theta are no chain (see `replaced_joints`). `RobotError` for a joint with several degrees of freedom
+    or a name of the chain's."""
     placement = pin.SE3.Identity() if root is None else root
-    plan = _Plan(source, replaced_joints(source), tuple(head), placement, frozenset(reversed_joints))
+    count = replaced_joints(source) if replaced is None else replaced
+    plan = _Plan(source, count, tuple(head), placement, frozenset(reversed_joints))
     _check(plan, where)
     model = pin.Model()
     model.name, model.gravity = source.name, source.gravity
@@ -128,7 +131,7 @@ def _check(plan: _Plan, where: str) -> None:
         expected = "joints with one degree of freedom (revolute, continuous, prismatic or helical)"
         raise RobotError(few(bad), where=where, expected=expected)
     names = {*source.names, *(frame.name for frame in source.frames)}
-    clashes = [name for name in CHAIN if name in names]
+    clashes = [name for name, _ in plan.head if name in names]
     if clashes and plan.count != 3:
         raise RobotError(f"joints or frames have the coordinates' names {', '.join(clashes)}", where=where)
 

@@ -5,32 +5,48 @@ two parents, zero axes) silently."""
 
 import re
 from collections import defaultdict
-from collections.abc import Collection, Container, Iterable
+from collections.abc import Collection, Container, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from nmm.findings import Finding
 from nmm.platforms import PLATFORMS
 from nmm.robots.loading.budget import MOST_IN_A_ROW, MOST_LINKS, MOST_MOVING
+from nmm.robots.loading.check_limits import (
+    ACCELERATIONS,
+    accelerations,
+    limits_of_continuous,
+    soft_limits,
+)
 from nmm.robots.loading.check_parts import FindMesh, check_joint, check_link, check_material
-from nmm.robots.loading.xml_tree import Attributes, Element, Owner, XmlError, child, children, link_at, parse
+from nmm.robots.loading.file_elements import URDF, unread
+from nmm.robots.loading.mending import write_rpy
+from nmm.robots.loading.xml_tree import (
+    QUATERNIONS,
+    Attributes,
+    Element,
+    Owner,
+    XmlError,
+    child,
+    children,
+    link_at,
+    parse,
+)
 from nmm.robots.mimic_joints import MimicJoint
 
-_VERSION = re.compile(r"1\.[012]")
+# As the C++ reader takes it.
+_VERSION = re.compile(r"\s*0*1\.0*([012])")
+#: The parts of a link that have a place.
+_PLACED = ("inertial", "visual", "collision")
 #: Names of frames that the model gets anyway.
-RESERVED = {
-    "x": "a coordinate",
-    "y": "a coordinate",
-    "theta": "a coordinate",
-    "universe": "Pinocchio's world",
-}
+RESERVED = ("x", "y", "theta", "universe")
 
 
 @dataclass(frozen=True)
 class CheckedUrdf:
     """A description without problems: its <robot> element and what is said there. `meshes` are files by the
     name in the description; each mimic joint comes after its leader. `spared` are faults that kinematics does
-    not feel."""
+    not feel, `unread` what of it does not count; `accelerations` are joints' limits, m/s^2, rad/s^2."""
 
     root: Element
     name: str
@@ -38,15 +54,17 @@ class CheckedUrdf:
     mimic_joints: tuple[MimicJoint, ...]
     platform: str | None
     spared: tuple[Finding, ...]
+    unread: tuple[Finding, ...]
+    accelerations: Mapping[str, float]
 
 
 def inspect(
-    text: str, find_mesh: FindMesh | None = None, lock: Container[str] = ()
+    text: str | Element, find_mesh: FindMesh | None = None, lock: Container[str] = ()
 ) -> tuple[CheckedUrdf | None, list[Finding]]:
-    """A URDF's description (None where the text is none) and its faults. Without `find_mesh`, mesh files are
-    taken to exist; joints in `lock` will not move, and so follow none."""
+    """A URDF's description (None where the text is none) and its faults, of its text or its <robot>. Without
+    `find_mesh`, mesh files are taken to exist; joints in `lock` will not move, and so follow none."""
     try:
-        root = parse(text)
+        root = parse(text) if isinstance(text, str) else text
     except XmlError as error:
         return None, [error.finding]
     reader = Attributes()
@@ -82,15 +100,14 @@ def _counts(root: Element) -> list[tuple[str, int, int]]:
 
 
 def _check_robot(root: Element, reader: Attributes, find_mesh: FindMesh, lock: Container[str]) -> CheckedUrdf:
-    spared = Attributes()
+    minor = _minor(root, reader)
+    reader.minor, spared = minor, Attributes(minor=minor)
+    not_read = unread(root, URDF, minor)
     for element in root.iter():
         if element.tag.startswith("xacro:") and isinstance(element, Element):
             spared.add(element, "xacro_left_over", element=element.tag)
     if not root.get("name"):
         reader.add(root, "attribute_missing", element="robot", attribute="name")
-    version = root.get("version", "1.0")
-    if not _VERSION.fullmatch(version):
-        reader.add(root, "version_unknown", got=version)
     links, joints = children(root, "link"), children(root, "joint")
     _check_names(links, "link", reader)
     _check_names(joints, "joint", reader)
@@ -110,7 +127,23 @@ def _check_robot(root: Element, reader: Attributes, find_mesh: FindMesh, lock: C
         check_joint(joint, reader, spared, carries_all=first == [joint])
     mimic_joints = check_mimics(joints, reader, spared, lock)
     platform, name = _declared_platform(root, reader), root.get("name") or ""
-    return CheckedUrdf(root, name, meshes, mimic_joints, platform, tuple(spared.found))
+    if minor >= QUATERNIONS:
+        write_rpy(joints)
+        write_rpy(part for link in links for tag in _PLACED for part in children(link, tag))
+    not_read += soft_limits(joints) + limits_of_continuous(joints)
+    limits = accelerations(joints) if minor >= ACCELERATIONS else {}
+    return CheckedUrdf(
+        root, name, meshes, mimic_joints, platform, tuple(spared.found), tuple(not_read), limits
+    )
+
+
+def _minor(root: Element, reader: Attributes) -> int:
+    """What is behind the point of the file's version."""
+    version = root.get("version", "1.0")
+    found = _VERSION.fullmatch(version)
+    if found is None:
+        reader.add(root, "version_unknown", got=version)
+    return 0 if found is None else int(found[1])
 
 
 def _declared_platform(root: Element, reader: Attributes) -> str | None:
@@ -134,8 +167,6 @@ def _check_names(elements: list[Element], kind: str, reader: Attributes) -> None
         name = element.get("name")
         if not name:
             reader.add(element, "name_missing", kind=kind)
-        elif name in RESERVED:
-            reader.add(element, "name_reserved", kind=kind, name=name, taken_by=RESERVED[name])
         elif name in seen:
             reader.add(element, "name_twice", kind=kind, name=name)
         else:

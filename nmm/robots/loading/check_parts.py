@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from nmm.findings import Finding
+from nmm.robots.loading.check_limits import check_limit
 from nmm.robots.loading.xml_tree import NOBODY, Attributes, Element, Owner, child, children, link_at
 
 #: The file of a mesh by its name, why there is none ("mesh_missing"), or None to leave the shape out.
@@ -123,7 +124,7 @@ def _check_mesh(
     name = reader.text(mesh, "filename", owner)
     found = None if name is None else find_mesh(name)
     if isinstance(found, Finding):
-        reader.found.append(replace(found, where={"line": mesh.line, **owner}))
+        reader.found.append(replace(found, where={**mesh.place, **owner}))
     elif found is not None and found.suffix.lower() not in MESH_SUFFIXES:
         reader.add(mesh, "mesh_format_unknown", owner, mesh=name, available=[*MESH_SUFFIXES])
     elif name is not None and found is not None:
@@ -144,7 +145,7 @@ def check_joint(joint: Element, reader: Attributes, spared: Attributes, carries_
         reader.add(joint, "joint_helical", owner, kind=kind, available=[*TYPES])
     elif reader.choice(joint, kind, TYPES, "joint type", owner) and kind != "fixed":
         _check_axis(joint, owner, reader)
-        _check_limit(joint, kind, owner, reader, spared)
+        check_limit(joint, kind, owner, reader, spared)
         _check_dynamics(joint, owner, reader)
 
 
@@ -163,19 +164,6 @@ def _check_axis(joint: Element, owner: Owner, reader: Attributes) -> None:
     xyz = None if axis is None else reader.vector(axis, "xyz", 3, owner, required=True)
     if axis is not None and xyz is not None and math.hypot(*xyz) < 1e-6:
         reader.add(axis, "axis_zero", owner, got=axis.get("xyz"))
-
-
-def _check_limit(joint: Element, kind: str, owner: Owner, reader: Attributes, spared: Attributes) -> None:
-    limit = child(joint, "limit")
-    if limit is None:
-        if kind != "continuous":
-            reader.add(joint, "limit_missing", owner, kind=kind)
-        return
-    spared.number(limit, "effort", owner, required=True, minimum=0.0)
-    spared.number(limit, "velocity", owner, required=True, minimum=0.0)
-    lower, upper = reader.number(limit, "lower", owner) or 0.0, reader.number(limit, "upper", owner) or 0.0
-    if kind != "continuous" and lower > upper:
-        reader.add(limit, "limits_crossed", owner, lower=lower, upper=upper)
 
 
 def _check_dynamics(joint: Element, owner: Owner, reader: Attributes) -> None:
@@ -246,7 +234,7 @@ def _on_bodies(links: list[Element], joints: list[Element], found: Attributes) -
     inertials = {link.get("name", ""): child(link, "inertial") for link in links}
     heavy = {body(name) for name, one in inertials.items() if one is not None and _inertia(one)[0] > 0.0}
     for link, (name, one) in zip(links, inertials.items(), strict=True):
-        if name in above and body(name) == name and name not in heavy:
+        if link.line and name in above and body(name) == name and name not in heavy:
             about = {"moved_by": above[name].get("name"), "inertial": one is not None}
             found.add(link, "body_without_mass", {"link": name}, **about)
 
@@ -260,7 +248,7 @@ def _on_joints(joints: list[Element], found: Attributes) -> None:
         if limit is None:
             found.add(joint, "velocity_unlimited", owner)
             continue
-        if _number(limit, "velocity") == 0.0:
+        if limit.get("velocity") is not None and _number(limit, "velocity") == 0.0:
             found.add(limit, "velocity_zero", owner)
         lower, upper = _number(limit, "lower"), _number(limit, "upper")
         if kind != "continuous" and lower == upper:

@@ -7,7 +7,7 @@ import io
 import os
 import re
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -20,9 +20,9 @@ from nmm.errors import RobotError, expect_known
 from nmm.findings import Finding
 from nmm.findings.robot_file import refusal
 from nmm.robots.loading.budget import STEPS_OF_A_FILE, BeyondBound, Budget, counted_xacro
-from nmm.robots.loading.mjcf import urdf_of
+from nmm.robots.loading.mjcf import Converted, urdf_of
 from nmm.robots.loading.packages import Packages
-from nmm.robots.loading.xml_tree import XmlError, parse, read_text
+from nmm.robots.loading.xml_tree import Element, XmlError, parse, read_text
 from nmm.text_format import listed, one_line
 
 SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf")
@@ -37,8 +37,9 @@ _LOCK = threading.RLock()
 
 @dataclass(frozen=True)
 class Description:
-    """URDF text read from `path`; `expanded` by xacro, its lines are not the file's. `arguments` are the
-    xacro arguments used, defaults included; `notes` xacro's warnings."""
+    """The text read from `path`; `expanded` by xacro, its lines are not the file's. `arguments` are the
+    xacro arguments used, defaults included; `notes` xacro's warnings, or what is left out of an MJCF file;
+    `mjcf` what such a file says."""
 
     xml: str
     path: Path
@@ -46,6 +47,16 @@ class Description:
     expanded: bool = False
     arguments: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[Finding, ...] = ()
+    mjcf: Converted | None = None
+
+    @property
+    def urdf(self) -> str | Element:
+        """The URDF's text, or its <robot>, whose elements have the lines of the MJCF file."""
+        return self.xml if self.mjcf is None else self.mjcf.urdf
+
+    def placed(self, found: Iterable[Finding]) -> list[Finding]:
+        """Findings in its text, without their lines where these are not the file's."""
+        return [replace(one, where={}) if self.expanded else one for one in found]
 
 
 def describe(
@@ -67,6 +78,8 @@ def describe(
         for name in texts:
             expect_known("xacro argument", name, used, file, RobotError)
         notes = tuple(Finding("xacro_warned", {"text": text}) for text in warnings)
+        if "<mujoco" in xml:
+            packages.mesh_folder = _mesh_folder(parse(xml))
         return Description(xml, file, packages, expanded=True, arguments=used, notes=notes)
     if texts:
         what = f"arguments ({', '.join(texts)}) are for .xacro files, others have none"
@@ -77,9 +90,16 @@ def describe(
         except XmlError as error:
             raise refusal(file, error.finding) from None
         if root.tag == "mujoco":
-            xml, notes = urdf_of(root, file)
-            return Description(xml, file, packages, expanded=True, notes=notes)
+            mjcf = urdf_of(root, file)
+            return Description(text, file, packages, notes=mjcf.notes, mjcf=mjcf)
+        packages.mesh_folder = _mesh_folder(root)
     return Description(text, file, packages)
+
+
+def _mesh_folder(root: Element) -> str | None:
+    """The folder of the meshes that a URDF names to MuJoCo, if it does."""
+    compiler = root.find("mujoco/compiler")
+    return None if compiler is None else compiler.get("meshdir", compiler.get("assetdir"))
 
 
 def _without_comments(text: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -13,8 +14,8 @@ from nmm.errors import RobotError, expect_kind, one_or_several
 from nmm.platforms import Platform, platform_by_name
 from nmm.robots.loading.models import Options, robot_from
 from nmm.robots.loading.packages import PACKAGE, package_file
-from nmm.robots.loading.source import read_file, read_model, source_path
-from nmm.robots.loading.srdf import with_srdf
+from nmm.robots.loading.source import Source, read_file, read_model, source_path
+from nmm.robots.loading.srdf_fitting import with_srdf, with_states
 from nmm.robots.robot import Robot
 
 
@@ -69,8 +70,9 @@ def load(
     limits : largest absolute values of the platform's inputs, by name, in their units
     missing_meshes : "error", or "skip" to leave out, with a note, the shapes whose mesh is not there
     visual_model, collision_model : the shapes, with a Pinocchio model
-    srdf : a file of postures, groups and pairs of links that may touch; by default the one beside the file
-        or in ../srdf that has the file's name or the robot's
+    srdf : a file of postures, groups, joints without a motor and pairs of links that may touch (a xacro file
+        gets `arguments`); by default the one beside the file or in ../srdf that has the file's name or the
+        robot's
 
     Returns
     -------
@@ -115,9 +117,23 @@ def load(
         if arguments or folders:
             raise RobotError("they are for files, not for a pin.Model", where="arguments, package_dirs")
         model = read_model(source, visual_model, collision_model)
-        return with_srdf(robot_from(model, options), srdf, None, model.name)
+        return _with_srdf(model, options, srdf, None, folders)
     if visual_model is not None or collision_model is not None:
         what = "they are for a pin.Model: a file holds its own shapes"
         raise RobotError(what, where="visual_model, collision_model")
     read = read_file(source, arguments, folders, options.lock, missing_meshes)
-    return with_srdf(robot_from(read, options), srdf, source_path(source, folders), read.name)
+    return _with_srdf(read, options, srdf, source_path(source, folders), folders)
+
+
+def _with_srdf(
+    source: Source,
+    options: Options,
+    srdf: str | Path | None,
+    file: Path | None,
+    folders: Sequence[str | Path],
+) -> Robot:
+    def held(values: Mapping[str, float]) -> Robot:
+        robot = robot_from(source, replace(options, lock={**values, **options.lock}))
+        return robot if source.mjcf is None else with_states(robot, source.mjcf.states, source.mjcf.start)
+
+    return with_srdf(held({}), srdf, file, source.name, held, folders)

@@ -14,7 +14,7 @@ from nmm.robots.loading.chain import CHAIN, Rebuilt
 from nmm.robots.loading.joint_kinds import is_revolute
 from nmm.robots.mimic_joints import MimicJoint, first_leaders, settled
 from nmm.robots.robot import Robot
-from nmm.text_format import is_pattern, matching
+from nmm.text_format import apart, is_pattern, matching
 
 # Limits are decimal fractions of angles that are none.
 _SLACK = 1e-9
@@ -88,7 +88,7 @@ def with_locked(
     """The model with joints of `lock` (see `load`) and of `standing` (no note) fixed on the body above them;
     `RobotError` for no joint, one of the platform's `own`, and no number or one outside the limits."""
     model = rebuilt.model
-    free = [str(name) for name in model.names][len(CHAIN) + 1 :]
+    free = [str(name) for name in list(model.names)[1:] if name not in CHAIN]  # a fixed base has no chain
     lock = _named(lock, [name for name in free if name not in own], mimic_joints, where)
     values = {name: _value(name, value, free, own, where) for name, value in lock.items()}
     for name, value in values.items():
@@ -145,7 +145,7 @@ def _check_limits(model: pin.Model, name: str, value: float, where: str, more: s
     index = model.joints[model.getJointId(name)].idx_q
     lower, upper = float(model.lowerPositionLimit[index]), float(model.upperPositionLimit[index])
     if not lower - _SLACK <= value <= upper + _SLACK:
-        what = f"{value:g} is outside its limits, from {lower:g} to {upper:g}"
+        what = "{} is outside its limits, from {} to {}".format(*apart(value, lower, upper, digits=6))
         raise RobotError(what, where=f"{where}: lock: {name}{more}", got=value)
 
 

@@ -37,7 +37,9 @@ from nmm.robots.wheel import Wheel
 _LEAN = 0.2
 # A centre so near the root link's xy plane lies in it: the plane is then not the ground.
 _ON_PLANE = 1e-6
-_SHORT_NAMES = re.compile("caster|castor|(?<![a-z])(?:[lr]w|[fbr][lr]|[lr][fbr])(?![a-z])")
+_SHORT_NAMES = re.compile("caster|castor|(?<![a-z])[lr]w(?![a-z])")
+#: Of joints on the base that turn without end alone: a walking robot's legs are called so, too.
+_CORNERS = re.compile("(?<![a-z])(?:[fbr][lr]|[lr][fbr])(?![a-z])")
 #: Parts of the names of links that are wheels.
 _WHEELS = ("wheel", "tire", "tyre")
 #: Joints that have to be wheels, or the radius (m) of each; None finds them.
@@ -137,15 +139,14 @@ class Measured:
 
     def is_named_wheel(self, joint: int) -> bool:
         """Whether its name or its child link's holds "wheel" or, where it can be a wheel's, "caster", or is
-        that of a wheel at the left or right, or at a corner: lw, rw_joint, fl, rear_lr. Knees are called so,
-        too: below a leg's joints the short names count only where it turns without end."""
+        that of a wheel at the left or right, or at a corner: lw, rw_joint, fl, rear_lr."""
         names = " ".join([str(self.model.names[joint]), *self.links.get(joint, ())]).lower()
-        if is_named(names, _WHEELS):
+        rolls = self.why_not_rolling(joint) is None
+        if is_named(names, _WHEELS) or (rolls and _SHORT_NAMES.search(names)):
             return True
-        if self.why_not_rolling(joint) is not None or _SHORT_NAMES.search(names) is None:
-            return False
-        legs = [one for one in self.above(joint) if is_revolute(self.model.joints[one])]
-        return all(map(self.is_upright, legs)) or not np.isfinite(_ends(self.model, joint)).any()
+        endless = not np.isfinite(_ends(self.model, joint)).any()
+        on_base = int(self.model.parents[joint]) == self.root
+        return rolls and endless and on_base and _CORNERS.search(names) is not None
 
     def carries_wheel_link(self, joint: int) -> bool:
         """Whether a link that is called a wheel is fixed to the joint's body."""

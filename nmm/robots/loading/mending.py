@@ -1,12 +1,32 @@
 """What Pinocchio gets in place of parts with faults that kinematics does not feel, but its reader does."""
 
+from collections.abc import Iterable
 from xml.etree import ElementTree
 
+import numpy as np
+import pinocchio as pin
+
 from nmm.robots.loading.check_parts import MOMENTS, check_inertial, check_material
-from nmm.robots.loading.xml_tree import NOBODY, Attributes, Element, child, children
+from nmm.robots.loading.xml_tree import NOBODY, QUATERNIONS, Attributes, Element, child, children
 
 #: A limit that counts as none.
 NO_LIMIT = "1.7976931348623157e+308"
+
+
+def write_rpy(parents: Iterable[Element]) -> None:
+    """Puts roll, pitch, yaw, rad, in place of the quaternions of these elements' origins."""
+    for parent in parents:
+        origin = child(parent, "origin")
+        if origin is None or "quat_xyzw" not in origin.attrib:
+            continue
+        reader = Attributes(minor=QUATERNIONS)
+        reader.origin(parent, NOBODY)
+        text = origin.attrib.pop("quat_xyzw")
+        if not reader.found:
+            turn = np.array(text.split(), dtype=float)
+            matrix = pin.Quaternion(turn / np.linalg.norm(turn)).matrix()
+            text = " ".join(repr(round(float(angle), 17)) for angle in pin.rpy.matrixToRpy(matrix))
+        origin.set("rpy", text)  # the four words of a faulty one are no angles: `inertials` leaves it out
 
 
 def inertials(link: Element) -> list[ElementTree.Element]:

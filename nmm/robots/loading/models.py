@@ -27,9 +27,19 @@ from nmm.robots.loading.measured_joints import (
     speed_limit,
     without_radius,
 )
-from nmm.robots.loading.provenance import Parts
+from nmm.robots.loading.names_apart import (
+    Names,
+    apart,
+    joints_among,
+    name_notes,
+    notes_with,
+    of_file,
+    renamed,
+    with_names,
+)
+from nmm.robots.loading.provenance import Parts, acceleration_notes
 from nmm.robots.loading.source import Source
-from nmm.robots.loading.virtual_base import VirtualBase, find_virtual_base
+from nmm.robots.loading.virtual_base import VirtualBase, find_virtual_base, gantry
 from nmm.robots.loading.wheel_search import find_undercarriage
 from nmm.robots.robot import Robot
 from nmm.robots.wheel import Wheel
@@ -56,13 +66,19 @@ def robot_from(source: Source, options: Options) -> Robot:
     """`RobotError` for an unusable joint, an unknown joint or frame, a platform that does not fit, wheels
     that leave open how they drive."""
     where, is_fixed = source.where, _is_fixed(source, options)
+    source, names = apart(source)
+    options = _naming(options, names)
     rebuilt = rebuild(source.model, (source.visual_model, source.collision_model), where)
     rebuilt.model.name = options.name or source.name
     stated = options.platform.coordinates[len(CHAIN) :] if isinstance(options.platform, Platform) else ()
     made = with_locked(rebuilt, options.lock, source.mimic_joints, where, stated)
-    base = find_virtual_base(made.rebuilt.model, where)
+    base, slides = find_virtual_base(made.rebuilt.model, where), gantry(made.rebuilt.model, where)
+    stands = bool(slides) and options.platform is None and source.platform is None
+    if stands:
+        options, is_fixed, base = replace(options, platform=FixedBase()), True, None
     if base is not None and not is_fixed:
         made = _standing(made, dict.fromkeys(base.joints, 0.0), where)
+        made = replace(made, rebuilt=_about(made.rebuilt, base.place, where))
     undercarriage = find_undercarriage(_measured(made, source), options.wheels, stated)
     if undercarriage.held:
         made = _standing(made, undercarriage.held, where)
@@ -81,26 +97,37 @@ def robot_from(source: Source, options: Options) -> Robot:
             raise error.at(where, RobotError) from None
     made = _turned_up(made, platform, where)
     remarks = [*undercarriage.notes(), *chosen.remarks]
+    if stands:
+        remarks.append(Finding("gantry", {"names": [*slides]}))
     if base is not None:
         platform = base.limited(platform)
-        remarks.append(base.note(platform))
+        of_base = {new: old for new, old in of_file(names).items() if new in base.joints}
+        made = replace(made, rebuilt=replace(made.rebuilt, notes=notes_with(made.rebuilt.notes, of_base)))
+        remarks += notes_with([base.note(platform)], of_base)
     rebuilt = made.rebuilt
     added = None if layout is None else platform.added_joint(layout)
     if added is not None:
         rebuilt = _with_joint(rebuilt, added, where)
     own = _own_joints(platform, rebuilt.model, made.values, where)
-    made = replace(made, rebuilt=_on_platform(rebuilt, platform, own, where))
+    made = replace(made, rebuilt=_on_platform(rebuilt, platform, own, source, where))
     if not platform.coordinates:
-        made = _with_held_wheels(made, options.wheels, source)
+        made = renamed(_with_held_wheels(made, options.wheels, source), of_file(names))
+        names = {old: new for old, new in names.items() if old not in CHAIN}
     elif layout is not None:
         made, more = _with_idle_parts_held(made, layout, own, source)
         remarks += more
+    like_inputs = joints_among(made.rebuilt.model, platform.inputs)
+    made, names, options = renamed(made, like_inputs), {**names, **like_inputs}, _naming(options, like_inputs)
+    remarks += name_notes(names, () if base is None else base.joints)
     provenance = replace(
         source.provenance,
         locked=made.values,
         mimicked=made.mimicked,
-        platform=chosen.origin,
+        platform="base" if stands else chosen.origin,
         contradictions=chosen.contradictions,
+        base=() if base is None or is_fixed else base.joints,
+        accelerations=with_names(source.provenance.accelerations, names),
+        renamed={**source.provenance.renamed, **names},
     )
     parts = Parts(made.rebuilt.geometries[1], (*source.notes, *made.rebuilt.notes, *remarks), provenance)
     sliding = () if layout is None else _sliding(layout)
@@ -125,6 +152,12 @@ def _moved(made: Locked, placement: pin.SE3, where: str) -> Locked:
     reached = {"at": (placement.translation + 0.0).tolist(), "yaw": _yaw(placement)}
     notes = (*rebuilt.notes, Finding("reference_moved", reached))
     return replace(made, rebuilt=replace(moved, notes=notes))
+
+
+def _naming(options: Options, names: Names) -> Options:
+    """The options with other names of joints and frames."""
+    given = {key: with_names(getattr(options, key), names) for key in ("lock", "wheels", "axle", "steer")}
+    return replace(options, **given)
 
 
 def _axle_placement(model: pin.Model, axle: str | ArrayLike, where: str) -> pin.SE3:
@@ -181,8 +214,6 @@ class _Chosen:
 def _platform(made: Locked, source: Source, options: Options, base: VirtualBase | None) -> _Chosen:
     kind: Platform | str | None = source.platform if options.platform is None else options.platform
     origin = "file" if options.platform is None else "given"
-    if kind is None and base is not None and base.kind is not None:
-        kind, origin = base.kind, "base"
     if _is_fixed(source, options):
         return _Chosen(FixedBase(), origin)  # there is nothing to measure
     measured = _measured(made, source)
@@ -194,7 +225,7 @@ def _platform(made: Locked, source: Source, options: Options, base: VirtualBase 
             found = recognized(layout)
             kind, told, origin = found.kind, found.notes, "wheels" if found.is_told else "default"
             if base is not None and origin == "default":
-                origin = "base"
+                kind, origin = base.kind or kind, "base"
             if origin == "default":
                 names = measured.fixed_wheels
                 told = (Finding("wheels_fixed", {"names": names}) if names else Finding("no_wheels"),)
@@ -270,10 +301,24 @@ def _own_joints(
     return own
 
 
-def _on_platform(rebuilt: Rebuilt, platform: Platform, own: Sequence[str], where: str) -> Rebuilt:
+def _about(rebuilt: Rebuilt, place: pin.SE3, where: str) -> Rebuilt:
+    """The model whose x, y and theta count from a place in its root link, and nothing else changes."""
+    model = rebuilt.model.copy()
+    model.jointPlacements[1] = model.jointPlacements[1] * place
+    moved = rebuild(model, rebuilt.geometries, where, root=place.inverse())
+    return replace(moved, notes=rebuilt.notes)
+
+
+def _on_platform(
+    rebuilt: Rebuilt, platform: Platform, own: Sequence[str], source: Source, where: str
+) -> Rebuilt:
     model = rebuilt.model
     if not platform.coordinates:
-        made = rebuild(model, rebuilt.geometries, where, root=model.jointPlacements[1], head=())
+        start = {} if source.mjcf is None else source.mjcf.start
+        x, y, yaw = (start.get(name, 0.0) for name in CHAIN)
+        stands = pin.SE3(pin.utils.rotate("z", yaw), np.array([x, y, 0.0]))
+        root = stands * model.jointPlacements[1]
+        made = rebuild(model, rebuilt.geometries, where, root=root, head=())
     else:
         made = rebuild(model, rebuilt.geometries, where, first=own) if own else rebuilt
     return replace(made, notes=rebuilt.notes)
@@ -333,7 +378,7 @@ def _without_wheels(
         mimic_joints=mimic_joints,
         parts=replace(parts, provenance=replace(parts.provenance, reduced=tuple(names))),
     )
-    remarks = (*limit_notes(robot), *slip_warnings(robot))
+    remarks = (*limit_notes(robot), *acceleration_notes(robot), *slip_warnings(robot))
     return replace(robot, **robot.shapes._asdict(), notes=(*robot.notes, *remarks))
 
 

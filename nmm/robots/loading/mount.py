@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from nmm.arrays import array, vector
 from nmm.errors import InputError, RobotError, expect_known, few
 from nmm.findings import Finding
 from nmm.platforms import FixedBase
-from nmm.robots.loading.chain import rebuild, replaced_joints
+from nmm.robots.loading.chain import CHAIN, rebuild
 from nmm.robots.loading.load import load
 from nmm.robots.loading.locking import add_pairs, told_apart
 from nmm.robots.loading.models import Options, robot_from
@@ -103,8 +104,9 @@ def _mounted(
     platform = _Body(base.display_model, base.shapes.visual_model, parts.collision_model)
     # The arm alone: of a fixed base, with its wheels standing still.
     model, shapes = with_wheels_fixed(arm)
-    root = model.jointPlacements[1] if replaced_joints(model) else pin.SE3.Identity()
-    rebuilt = rebuild(model, shapes, arm.name, root=root, head=())
+    replaced = len(CHAIN) if arm.platform.coordinates else 0
+    root = model.jointPlacements[1] if replaced else pin.SE3.Identity()
+    rebuilt = rebuild(model, shapes, arm.name, root=root, head=(), replaced=replaced)
     body = _Body(rebuilt.model, *rebuilt.geometries)
     if body.model.nq == 0:
         raise RobotError("has no movable joint, so it is no arm", where=arm.name)
@@ -124,6 +126,7 @@ def _mounted(
         visual_model=visual,
         collision_model=collision,
         all_pairs=False,
+        on_chain=bool(base.platform.coordinates),
         arguments={**base.arguments, **{f"{key}.{k}": value for k, value in arm.arguments.items()}},
         notes=(*parts.notes, *notes, Finding("arm_mounted", mounted)),
         provenance=provenance,
@@ -205,10 +208,11 @@ def _appended(
 
 def _loaded_arm(source: str | Path | pin.Model) -> Robot:
     """The robot of a file whose arm is wanted: its platform matters only for which wheels stand still."""
-    try:
-        return load(source)
-    except InputError:  # on no platform then: a joint may be called v, and a declared platform need not fit
-        return load(source, platform=FixedBase())
+    with suppress(InputError):  # on no platform then: a declared one need not fit
+        robot = load(source)
+        if not robot.renamed:  # nor need a joint be called otherwise than v
+            return robot
+    return load(source, platform=FixedBase())
 
 
 def _pose(placement: pin.SE3 | ArrayLike | Sequence[ArrayLike] | None) -> pin.SE3:

@@ -40,6 +40,8 @@ class Packages:
         self.file = file.absolute()
         unnamed = [folder for name, folder in given if not name]
         self.folders = (*unnamed, *_environment_folders(), *_share_folders())
+        #: Where MuJoCo looks for meshes, as the file says it.
+        self.mesh_folder: str | None = None
         self.nearby: dict[str, Path] = {}
         self.searched = (*self.folders, *self.file.parents)
         self.found: dict[str, Path | None] = {}
@@ -78,8 +80,16 @@ class Packages:
             missing = {"cause": "scheme", "scheme": scheme}
         found = next((path.absolute() for path in paths if os.path.isfile(path)), None)
         if found is None and missing["cause"] != "scheme":
-            found = self._nearby(name, rest if separator else name)
+            found = self._of_mujoco(name) or self._nearby(name, rest if separator else name)
         return found or Finding("mesh_missing", {"mesh": name, **missing})
+
+    def _of_mujoco(self, name: str) -> Path | None:
+        """The file where MuJoCo would find it, by its whole relative name or, as usual, by its last part."""
+        if self.mesh_folder is None:
+            return None
+        folder = self.file.parent / self.mesh_folder
+        parts = [name] * ("://" not in name) + [name.rpartition("/")[2]]
+        return next((folder / part for part in parts if os.path.isfile(folder / part)), None)
 
     def _nearby(self, name: str, path: str) -> Path | None:
         """The longest end of a path, of a folder and a file at least, that lies above the description; of a

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, array
 from nmm.errors import InputError, expect_known, few, no_such
 from nmm.robots.joint_table import twist
-from nmm.robots.loading.chain import CHAIN_JOINTS, Head, rebuild, replaced_joints
+from nmm.robots.loading.chain import CHAIN, CHAIN_JOINTS, Head, rebuild, replaced_joints
 from nmm.robots.loading.joint_kinds import is_continuous, is_mimic, is_simple, kind
 from nmm.robots.loading.provenance import with_wheels_fixed
 from nmm.robots.loading.root_layout import ROOTS, ChainRoot
@@ -96,7 +96,8 @@ def _models(robot: Robot, root: Root | str) -> PinocchioModels:
             raise InputError("has a fixed base", where=robot.name, expected="root 'chain' (none)", got=root)
         head = ()
     first = robot.platform.coordinates[len(CHAIN_JOINTS) :]
-    rebuilt = rebuild(model, shapes, robot.name, first=first, head=head)
+    replaced = len(CHAIN_JOINTS) if robot.platform.coordinates else 0
+    rebuilt = rebuild(model, shapes, robot.name, first=first, head=head, replaced=replaced)
     visual, collision = rebuilt.geometries
     collision.removeAllCollisionPairs()
     for pair in robot.shapes.collision_model.collisionPairs:
@@ -142,7 +143,9 @@ class PinocchioLayout:
         elif not isinstance(model, pin.Model):
             expected = f"a pin.Model or one of {', '.join(ROOTS)}"
             raise InputError(where="model", expected=expected, got=model)
-        self._head = replaced_joints(self.model)
+        # On a fixed base joints x, y, theta are the file's.
+        own_chain = robot.q_names[:3] == CHAIN and not robot.platform.coordinates
+        self._head = 0 if own_chain else replaced_joints(self.model)
         self._root = self._root_layout()
         self._pairs, self._held = self._matched()
         self._mimics = any(is_mimic(joint) for joint in self.model.joints)
@@ -261,7 +264,7 @@ class PinocchioLayout:
         following = [one.joint for one in robot.mimic_joints]
         pairs, still = [], {}
         for joint in range(self._head + 1, model.njoints):
-            name = str(model.names[joint])
+            name = robot.renamed.get(str(model.names[joint]), str(model.names[joint]))
             if is_mimic(model.joints[joint]) and name in (*held, *following):
                 own = [other for other in own if other != name]
                 continue
@@ -273,8 +276,8 @@ class PinocchioLayout:
                 still[joint] = float(held[name])
             elif name not in standing:
                 raise no_such("joint", name, own, f"the model, of robot {robot.name}")
-        names = {str(model.names[joint]) for joint, _, _ in pairs}
-        missing = [name for name in own if name not in names]
+        columns = {column for _, column, _ in pairs}
+        missing = [name for name in own if robot.coordinate(name) not in columns]
         if missing:
             steered = [wheel.swivel for wheel in robot.wheels if wheel.swivel in model.names]
             own = [name for name in missing if name in robot.platform.coordinates and steered]

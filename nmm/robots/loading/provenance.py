@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
 import pinocchio as pin
 
 from nmm.errors import RobotError
@@ -38,6 +39,9 @@ class Provenance:
     platform : where the kind of platform comes from: "given", "file", "wheels", "base" (of
         joints) or "default"
     contradictions : where the platform is not what the files' wheels and joints are
+    base : joints that the platform's x, y, theta stand for
+    accelerations : how fast joints' speeds may change by their file, m/s^2, rad/s^2
+    renamed : what joints and links are called here, by their names in the file, where these differ
     """
 
     packages: Mapping[str, Path | None] = field(default_factory=dict)
@@ -49,6 +53,9 @@ class Provenance:
     prefixed: Mapping[str, str] = field(default_factory=dict)
     platform: str = "given"
     contradictions: tuple[Finding, ...] = ()
+    base: tuple[str, ...] = ()
+    accelerations: Mapping[str, float] = field(default_factory=dict)
+    renamed: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def held(self) -> Mapping[str, float]:
@@ -58,6 +65,7 @@ class Provenance:
     def with_arm(self, arm: Provenance, key: str, prefix: str) -> Provenance:
         """This platform's, with that of an arm mounted under the name `key`."""
         locked = {prefix + name: value for name, value in arm.locked.items()}
+        accelerations = {prefix + name: value for name, value in arm.accelerations.items()}
         mimicked = {prefix + name: (prefix + of, value) for name, (of, value) in arm.mimicked.items()}
         return replace(
             self,
@@ -66,6 +74,7 @@ class Provenance:
             meshes={**self.meshes, **arm.meshes},
             locked={**self.locked, **locked},
             mimicked={**self.mimicked, **mimicked},
+            accelerations={**self.accelerations, **accelerations},
             prefixed={**self.prefixed, **({key: prefix} if prefix else {})},
         )
 
@@ -83,6 +92,29 @@ class Parts:
 def provenance_of(robot: Robot) -> Provenance:
     """What is known of the robot's making; nothing when `load` did not make it."""
     return robot.parts.provenance if isinstance(robot.parts, Parts) else Provenance()
+
+
+def accelerations_of(robot: Robot) -> dict[str, float]:
+    """By input, how fast it may change by the robot's files, m/s^2 or rad/s^2, what follows it included."""
+    inputs = {
+        robot.q_names[i]: name
+        for name, i in zip(robot.u_names, robot.rate_coordinates, strict=True)
+        if i >= 0
+    }
+    leaders = {one.joint: (one.leader, abs(one.multiplier)) for one in robot.mimic_joints}
+    found: dict[str, float] = {}
+    for joint, limit in provenance_of(robot).accelerations.items():
+        leader, factor = leaders.get(joint, (joint, 1.0))
+        if leader in inputs and factor > 0.0:
+            name = inputs[leader]
+            found[name] = min(found.get(name, np.inf), limit / factor)
+    return found
+
+
+def acceleration_notes(robot: Robot) -> list[Finding]:
+    """What the files say of accelerations, which limits heed where they are asked to."""
+    limits = accelerations_of(robot)
+    return [Finding("accelerations_of_file", {"limits": limits})] if limits else []
 
 
 def loaded_parts(robot: Robot) -> Parts:

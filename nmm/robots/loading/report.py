@@ -18,7 +18,7 @@ from nmm.robots.loading.ground import Ground, wheel_advice
 from nmm.robots.loading.load import load
 from nmm.robots.loading.locking import limit_notes
 from nmm.robots.loading.packages import Packages
-from nmm.robots.loading.provenance import provenance_of
+from nmm.robots.loading.provenance import acceleration_notes, provenance_of
 from nmm.robots.loading.xml_tree import Element, children, link_at
 from nmm.robots.meshes import read_meshes
 from nmm.robots.robot import Robot
@@ -112,14 +112,14 @@ def _report(description: Description, given: Mapping[str, Any], found: Sequence[
         mesh = meshes[name] = packages.mesh(name)
         return mesh if isinstance(mesh, Path) else None
 
-    checked, problems = inspect(description.xml, find_mesh, given.get("lock") or ())
+    checked, problems = inspect(description.urdf, find_mesh, given.get("lock") or ())
     warnings, facts = [*description.notes], dict[str, str]()
     robot = None
     if checked is not None:
         root = checked.root
         missing = {name: mesh for name, mesh in meshes.items() if isinstance(mesh, Finding)}
         problems += found
-        warnings += [*checked.spared, *packages.notes]
+        warnings += [*checked.spared, *packages.notes, *description.placed(checked.unread)]
         (problems if asked == "error" else warnings).extend(_missing_meshes(root, missing, asked))
         if not isinstance(packages, _Going):
             lost = [package for package, folder in packages.found.items() if folder is None]
@@ -134,7 +134,8 @@ def _report(description: Description, given: Mapping[str, Any], found: Sequence[
         robot, problems = _loaded(description.path, given)
     if robot is not None:
         top, ground = _top(root), Ground.of(robot) if robot.platform.coordinates else None
-        warnings += [*wheel_advice(robot), *limit_notes(robot)]
+        warnings += [one for one in robot.notes if one.code == "names_taken"]
+        warnings += [*wheel_advice(robot), *limit_notes(robot), *acceleration_notes(robot)]
         warnings += [*provenance_of(robot).contradictions, *robot.semantics.notes]
         warnings += [] if ground is None else ground.warnings(robot)
         facts |= _facts_of_robot(robot, None if ground is None else ground.fact(top))
@@ -158,7 +159,7 @@ def _missing_meshes(root: Element, missing: Mapping[str, Finding], asked: str | 
         lost = missing.get(name)
         if lost is not None and _NOWHERE not in name and isinstance(mesh, Element):
             values = {**lost.values, **becomes}
-            found.setdefault(name, replace(lost, values=values, where={"line": mesh.line}))
+            found.setdefault(name, replace(lost, values=values, where=mesh.place))
     return [*found.values()]
 
 

@@ -18,12 +18,13 @@ from nmm.errors import RobotError, expect_known, no_such
 from nmm.findings import Finding
 from nmm.findings.robot_file import refusal
 from nmm.robots.loading import mending
-from nmm.robots.loading.chain import mimic_joints_of
+from nmm.robots.loading.chain import CHAIN, mimic_joints_of, replaced_joints
 from nmm.robots.loading.check import CheckedUrdf, inspect
 from nmm.robots.loading.check_parts import mesh_scale, shape_of
 from nmm.robots.loading.description import SUFFIXES, describe
 from nmm.robots.loading.drive_marks import DriveMarks, drive_marks
 from nmm.robots.loading.measured_joints import Undercarriage
+from nmm.robots.loading.mjcf import Converted
 from nmm.robots.loading.packages import PACKAGE, package_file
 from nmm.robots.loading.provenance import Provenance
 from nmm.robots.loading.xml_tree import Element, child, children
@@ -45,8 +46,9 @@ class Source:
 
     where, label : its name in messages; its file, bundled name, or "pin.Model"
     all_pairs : whether we choose the collision pairs
+    on_chain : whether its first joints x, y, theta are a platform's, not the file's
     mimic_joints : each after its leader
-    platform : the kind that the file declares
+    platform : the kind that the file declares; mjcf : what a file of MuJoCo's says besides
     marks : what the file's text says of its drive; undercarriage: what its wheels hang on, once found"""
 
     name: str
@@ -56,6 +58,7 @@ class Source:
     visual_model: pin.GeometryModel
     collision_model: pin.GeometryModel
     all_pairs: bool
+    on_chain: bool = False
     arguments: Mapping[str, str] = field(default_factory=dict)
     mimic_joints: tuple[MimicJoint, ...] = ()
     platform: str | None = None
@@ -63,6 +66,7 @@ class Source:
     provenance: Provenance = field(default_factory=Provenance)
     marks: DriveMarks = field(default_factory=DriveMarks)
     undercarriage: Undercarriage = field(default_factory=Undercarriage)
+    mjcf: Converted | None = None
 
 
 def read_file(
@@ -83,10 +87,12 @@ def read_file(
             return found
         return meshes.setdefault(name, None if isinstance(found, Finding) else found)
 
-    checked, problems = inspect(description.xml, find_mesh, lock)
+    checked, problems = inspect(description.urdf, find_mesh, lock)
     if checked is None or problems:
         raise refusal(where, *problems, lines=not description.expanded)
     model, visual, collision = _pinocchio_models(checked, where)
+    for joint, armature in ({} if description.mjcf is None else description.mjcf.armature).items():
+        model.armature[model.joints[model.getJointId(joint)].idx_v] = armature
     missing = [name for name, file in meshes.items() if file is None]
     left_out = [Finding("shapes_left_out", {"names": missing})] if missing else []
     return Source(
@@ -100,9 +106,15 @@ def read_file(
         arguments=description.arguments,
         mimic_joints=checked.mimic_joints,
         platform=checked.platform,
-        notes=(*description.notes, *left_out, *packages.notes, *_spared(checked.spared)),
-        provenance=Provenance(dict(packages.found), packages.searched, meshes),
+        notes=(
+            *(*description.notes, *left_out, *packages.notes, *_spared(checked.spared)),
+            *description.placed(checked.unread),
+        ),
+        provenance=Provenance(
+            dict(packages.found), packages.searched, meshes, accelerations=checked.accelerations
+        ),
         marks=drive_marks(checked.root),
+        mjcf=description.mjcf,
     )
 
 
@@ -127,6 +139,7 @@ def read_model(
         visual_model=_shapes(visual_model, "visual_model", model),
         collision_model=_shapes(collision_model, "collision_model", model),
         all_pairs=False,
+        on_chain=replaced_joints(model) == len(CHAIN),
         mimic_joints=mimic_joints_of(model),
     )
 

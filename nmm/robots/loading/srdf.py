@@ -4,53 +4,38 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
-import pinocchio as pin
 
-from nmm.errors import RobotError, expect_known
+from nmm.errors import RobotError
 from nmm.findings import Finding
 from nmm.findings.robot_file import refusal
+from nmm.robots.loading.description import argument_texts, expand
+from nmm.robots.loading.file_elements import SRDF, unread
+from nmm.robots.loading.packages import Packages
+from nmm.robots.loading.srdf_parts import Group, Srdf, VirtualJoint
 from nmm.robots.loading.xml_tree import Element, XmlError, parse, read_text
-from nmm.robots.robot import Robot
-from nmm.robots.semantics import NamedPostures, Semantics
 
 #: Where it is looked for, from the URDF's folder: MoveIt's packages, example-robot-data, and beside it.
 _FOLDERS = (".", "../srdf", "../config", "../../{stem}_moveit_config/config")
-SUFFIX = ".srdf"
-#: What Pinocchio calls the joint between the world and the robot.
-_ROOT = "root_joint"
-#: How far a follower, or a locked joint, may be from where a state wants it, m or rad: files have few digits.
-_SLACK = 1e-4
+SUFFIXES = (".srdf", ".srdf.xacro")
 
 
-class Group(NamedTuple):
-    """A named part of a robot: joints, links (for the joint above each), chains (base, tip), other groups."""
+def read_srdf(
+    file: str | Path, arguments: Mapping[str, object] | None = None, package_dirs: Sequence[str | Path] = ()
+) -> Srdf:
+    """An SRDF, expanded where it is xacro, of whose arguments those given count that it asks for.
 
-    joints: tuple[str, ...]
-    links: tuple[str, ...]
-    groups: tuple[str, ...]
-    chains: tuple[tuple[str, str], ...]
-
-
-class Srdf(NamedTuple):
-    """A file in its own names: groups; each state's joint values (states of one name are merged); disabled
-    pairs of links; and the roots, joints that it adds between the world and the robot."""
-
-    path: Path
-    states: Mapping[str, Mapping[str, tuple[float, ...]]]
-    groups: Mapping[str, Group]
-    disabled: tuple[tuple[str, str], ...]
-    roots: tuple[str, ...]
-
-
-def read_srdf(file: str | Path) -> Srdf:
-    """`RobotError` for a file that is no SRDF, for missing names and for values that are no numbers."""
+    `RobotError` for a file that is no SRDF, for missing names and for values that are no numbers."""
     path = Path(os.path.expanduser(file))
+    is_xacro = False
     try:
-        root = parse(read_text(path))
+        text = read_text(path)
+        is_xacro = path.suffix.lower() == ".xacro" or "xmlns:xacro" in text
+        if is_xacro:
+            text = expand(path.absolute(), argument_texts(arguments), Packages(path, package_dirs))[0]
+        root = parse(text)
     except FileNotFoundError:
         raise RobotError(f"there is no file {path}", where="srdf", got=str(path)) from None
     except XmlError as error:
@@ -65,19 +50,36 @@ def read_srdf(file: str | Path) -> Srdf:
         for joint in state.iter("joint"):
             found[_attribute(joint, "name", path)] = _numbers(joint, path)
     groups = {_attribute(group, "name", path): _group(group, path) for group in root.findall("group")}
-    pairs = [(one.get("link1", ""), one.get("link2", "")) for one in root.iter("disable_collisions")]
-    roots = tuple(_attribute(one, "name", path) for one in root.iter("virtual_joint"))
-    return Srdf(path, states, groups, tuple(pairs), roots)
+    disabled, enabled = (
+        tuple((_attribute(one, "link1", path), _attribute(one, "link2", path)) for one in root.iter(tag))
+        for tag in ("disable_collisions", "enable_collisions")
+    )
+    untouched, passive = (
+        tuple(_attribute(one, name, path) for one in root.findall(tag))
+        for tag, name in (("disable_default_collisions", "link"), ("passive_joint", "name"))
+    )
+    motions = {
+        one.get("joint_name", "").strip(): one.get("value", "").strip()
+        for one in root.findall("joint_property")
+        if one.get("property_name", "").strip() == "motion_model"
+    }
+    roots = []
+    for one in root.iter("virtual_joint"):
+        name, kind = _attribute(one, "name", path), one.get("type", "planar").strip().lower()
+        roots.append(VirtualJoint(name, kind, one.get("child_link", "").strip(), motions.get(name, "")))
+    place = {"srdf": path.name}
+    notes = (replace(one, where=place if is_xacro else {**one.where, **place}) for one in unread(root, SRDF))
+    return Srdf(path, states, groups, disabled, tuple(roots), enabled, untouched, passive, tuple(notes))
 
 
 def srdf_beside(file: Path, robot: str) -> Path | None:
     """The SRDF in a usual place that has a description file's name, or is about the robot described there."""
     stem = file.name.split(".", 1)[0] if file.suffix.lower() == ".xacro" else file.stem
     folders = [file.absolute().parent / folder.format(stem=stem) for folder in _FOLDERS]
-    named = (folder / f"{stem}{SUFFIX}" for folder in folders)
+    named = (folder / f"{stem}{suffix}" for suffix in SUFFIXES for folder in folders)
     same = [path for path in named if path.is_file()][:1]
     if not same:
-        there = (path for folder in folders[:2] for path in sorted(folder.glob(f"*{SUFFIX}")))
+        there = (path for folder in folders[:2] for path in sorted(folder.glob(f"*{SUFFIXES[0]}")))
         same = [path for path in there if _is_of(path, robot)]
     if len(same) > 1:
         same = [path for path in same if path.stem.lower() == robot.lower()]
@@ -121,147 +123,3 @@ def _numbers(joint: ElementTree.Element, path: Path) -> tuple[float, ...]:
 def _refused(element: ElementTree.Element, path: Path, code: str, /, **values: object) -> RobotError:
     line = {"line": element.line} if isinstance(element, Element) else {}
     return refusal(f"srdf: {path}", Finding(code, values, line))
-
-
-def with_srdf(robot: Robot, given: str | Path | None, file: Path | None, name: str) -> Robot:
-    """The robot with the SRDF given (`RobotError` if it is none or has joints that the robot's file lacks),
-    or else with what fits of the one beside its file, and a note on what does not."""
-    path = given if given is not None else None if file is None else srdf_beside(file, name)
-    if path is None:
-        return robot
-    try:
-        semantics = _fitted(read_srdf(path), robot, strict=given is not None)
-    except RobotError as error:
-        if given is not None:
-            raise
-        reason = error.findings[0].as_json()  # reading alone is strict
-        semantics = Semantics(notes=(Finding("srdf_unused", {"reason": reason}, {"srdf": Path(path).name}),))
-    notes = (*robot.notes, *semantics.notes)
-    return replace(robot, **robot.shapes._asdict(), semantics=semantics, notes=notes)
-
-
-def _fitted(srdf: Srdf, robot: Robot, *, strict: bool) -> Semantics:
-    known = _joints(robot)
-    roots = {_ROOT, *srdf.roots} - known
-    notes: list[Finding] = []
-    postures = NamedPostures()
-    for name, state in srdf.states.items():
-        strange = [joint for joint in state if joint not in known | roots]
-        if strange and strict:
-            where = f"srdf: {srdf.path}: state {name}"
-            expect_known("joint", strange[0], sorted(known), where, RobotError)
-        if strange:
-            notes.append(_note("posture_joints_unknown", posture=name, names=strange))
-        named = _coordinates(state, roots, robot, name, notes)
-        if named:
-            postures[name] = named
-        if beyond := _beyond(named, robot):
-            notes.append(_note("posture_beyond", posture=name, beyond=beyond))
-    groups = _groups(srdf.groups, robot)
-    links = set(robot.frames)
-    disabled = tuple(pair for pair in srdf.disabled if links.issuperset(pair))
-    of_file = tuple(replace(note, where={"srdf": srdf.path.name}) for note in notes)
-    return Semantics(postures, groups, disabled, (srdf.path,), of_file)
-
-
-def _joints(robot: Robot) -> set[str]:
-    """Every joint of the robot's file: coordinates, wheels, and fixed ones."""
-    kinds = (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)
-    both = (*robot.model.frames, *robot.display_model.frames)
-    return {frame.name for frame in both if frame.type in kinds} - {"universe"}
-
-
-def _coordinates(
-    state: Mapping[str, tuple[float, ...]], roots: set[str], robot: Robot, name: str, notes: list[Finding]
-) -> dict[str, float]:
-    """The coordinates that a state sets, m and rad: no wheels, locked or mimic joints."""
-    still = robot.locked
-    values: dict[str, float] = {}
-    for joint, numbers in state.items():
-        if joint in roots:
-            values |= _place(numbers, robot)
-        elif joint in robot.q_names or joint in still:
-            if len(numbers) != 1:
-                notes.append(_note("posture_not_one_number", posture=name, name=joint, count=len(numbers)))
-            elif joint in robot.q_names:
-                values[joint] = -numbers[0] if joint in robot.reversed_joints else numbers[0]
-            elif abs(numbers[0] - still[joint]) > _SLACK:
-                about = {"posture": name, "name": joint, "locked": still[joint], "wanted": numbers[0]}
-                notes.append(_note("posture_locked", **about))
-    for one in robot.mimic_joints:
-        if one.joint not in values:
-            continue
-        wanted = values.pop(one.joint)
-        if one.leader not in values and one.multiplier:
-            values[one.leader] = (wanted - one.offset) / one.multiplier
-        elif one.leader in values and abs(one.value(values[one.leader]) - wanted) > _SLACK:
-            about = {"posture": name, "name": one.joint, "leader": one.leader, "mimic": str(one)}
-            notes.append(_note("posture_follows", **about, wanted=wanted))
-    return values
-
-
-def _beyond(values: Mapping[str, float], robot: Robot) -> dict[str, list[float]]:
-    """The coordinates that a state sets beyond their limits: value and limits."""
-    far = {}
-    for joint, value in values.items():
-        lower, upper = map(float, robot.q_limits[robot.coordinate(joint)])
-        if not lower - _SLACK <= value <= upper + _SLACK:
-            far[joint] = [value, lower, upper]
-    return far
-
-
-def _note(code: str, **values: object) -> Finding:
-    return Finding(code, values)
-
-
-def _place(numbers: Sequence[float], robot: Robot) -> dict[str, float]:
-    """x, y, theta from what an SRDF gives the joint below the world: planar, or free with a quaternion."""
-    if not {"x", "y", "theta"} <= {*robot.q_names}:
-        return {}
-    match numbers:
-        case x, y, _, qx, qy, qz, qw:
-            turn = np.arctan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
-        case x, y, cosine, sine:
-            turn = np.arctan2(sine, cosine)
-        case x, y, turn:
-            pass
-        case _:
-            return {}
-    return {"x": x, "y": y, "theta": float(turn)}
-
-
-def _groups(groups: Mapping[str, Group], robot: Robot) -> dict[str, tuple[str, ...]]:
-    """The inputs of each group that has some, under a name that is not taken."""
-    taken = {*robot.groups, *robot.u_names}
-    found: dict[str, tuple[str, ...]] = {}
-    for name in groups:
-        joints = _members(name, groups, robot, ())
-        inputs = tuple(one for one in robot.u_names[robot.platform.p :] if one in joints)
-        if inputs:
-            key, count = name, 0
-            while key in taken:
-                count += 1
-                key = f"{name}_{count}"
-            taken.add(key)
-            found[key] = inputs
-    return found
-
-
-def _members(name: str, groups: Mapping[str, Group], robot: Robot, above: tuple[str, ...]) -> set[str]:
-    """The joints of a group; none for an unknown or circular one."""
-    if name in above or name not in groups:
-        return set()
-    group = groups[name]
-    return {*group.joints}.union(
-        *(_above(robot, link)[-1:] for link in group.links),
-        *({*_above(robot, tip)} - {*_above(robot, base)} for base, tip in group.chains),
-        *(_members(one, groups, robot, (*above, name)) for one in group.groups),
-    )
-
-
-def _above(robot: Robot, link: str) -> list[str]:
-    """The robot's coordinates from the root to a link."""
-    if link not in robot.frames:
-        return []
-    joint = robot.model.frames[robot.frame_id(link)].parentJoint
-    return [str(robot.model.names[one]) for one in robot.model.supports[joint] if one > 0]

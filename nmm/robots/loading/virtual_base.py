@@ -26,12 +26,13 @@ _ROOM = 1.0
 class VirtualBase:
     """A base made of `joints`, from the root link on; `drives` if one turns it and the next slides it ahead.
     `speeds` are the joints' largest rates, rad/s or m/s, infinite without; `limits` where they end in the
-    file, rad or m."""
+    file, rad or m. With all joints at zero it stands at `place` in the root link: x, y and a yaw."""
 
     joints: tuple[str, ...]
     drives: bool
     speeds: tuple[float, ...]
     limits: Mapping[str, tuple[float, float]]
+    place: pin.SE3
 
     @property
     def kind(self) -> str | None:
@@ -60,18 +61,45 @@ def find_virtual_base(model: pin.Model, where: str) -> VirtualBase | None:
     measured = Measured(model, (), where)
     found, ways = _chain(measured, _is_endless)
     turns_first = len(found) == 2 and len(ways) == 1 and measured.is_upright(found[0])
-    drives = turns_first and abs(ways[0][0]) > 1.0 - _LEVEL
+    place = _place(measured, found)
+    drives = turns_first and abs(ways[0] @ place.rotation[:, 0]) > 1.0 - _LEVEL
     if not drives and len(found) + len(ways) < 4:
         found, ways = _chain(measured, _has_room)
         if len(found) + len(ways) < 5:
             return None
+        place = _place(measured, found)
     names = tuple(str(model.names[i]) for i in found)
     ends = {str(model.names[i]): _ends(model, i) for i in found if not _is_endless(model, i)}
-    return VirtualBase(names, drives, tuple(speed_limit(model, i) for i in found), ends)
+    return VirtualBase(names, drives, tuple(speed_limit(model, i) for i in found), ends, place)
 
 
-def _chain(measured: Measured, is_usable: Callable[[pin.Model, int], bool]) -> tuple[list[int], list[Array]]:
-    """Up to three joints at one point that turn or slide all else on the ground, and the slides' ways."""
+def gantry(model: pin.Model, where: str) -> tuple[str, ...]:
+    """The level slides, two at least, that move all else before a joint can turn it; none for a base."""
+    measured = Measured(model, (), where)
+    chain = _chain(measured, _moves)[0]
+    if any(measured.is_upright(joint) for joint in chain):
+        return ()
+    slides, ways = _chain(measured, _moves, apart=True)
+    slides = [joint for joint in slides if not measured.is_upright(joint)]
+    return tuple(str(model.names[joint]) for joint in slides) if len(ways) > 1 else ()
+
+
+def _place(measured: Measured, found: list[int]) -> pin.SE3:
+    """Where a base's joints have it at zero: about the one that turns it, with the yaw of what they carry."""
+    if not found:
+        return pin.SE3.Identity()
+    turning = next((joint for joint in found if measured.is_upright(joint)), found[-1])
+    x, y, _ = measured.placements[turning].translation
+    forward = measured.placements[found[-1]].rotation[:2, 0]
+    yaw = float(np.arctan2(forward[1], forward[0])) if np.linalg.norm(forward) > _LEVEL else 0.0
+    return pin.SE3(pin.utils.rotate("z", yaw), np.array([x, y, 0.0]))
+
+
+def _chain(
+    measured: Measured, is_usable: Callable[[pin.Model, int], bool], apart: bool = False
+) -> tuple[list[int], list[Array]]:
+    """Up to three joints at one point, or `apart`, that turn or slide all else on the ground, and the slides'
+    ways."""
     model = measured.model
     found: list[int] = []
     ways: list[Array] = []
@@ -83,7 +111,7 @@ def _chain(measured: Measured, is_usable: Callable[[pin.Model, int], bool]) -> t
         # Real joints are apart, those of a base are at one point.
         if (
             not is_usable(model, joint)
-            or (found and moved)
+            or (found and moved and not apart)
             or (way is None and not measured.is_upright(joint))
         ):
             break
@@ -107,6 +135,11 @@ def _is_endless(model: pin.Model, joint: int) -> bool:
 def _has_room(model: pin.Model, joint: int) -> bool:
     lower, upper = _ends(model, joint)
     return upper - lower >= _ROOM
+
+
+def _moves(model: pin.Model, joint: int) -> bool:
+    lower, upper = _ends(model, joint)
+    return lower < upper
 
 
 def _level_slide(measured: Measured, joint: int) -> Array | None:

@@ -19,11 +19,21 @@ from nmm.robots.loading.budget import MOST_ELEMENTS
 DEEPEST = 200
 #: A description with its meshes beside it is far shorter, bytes.
 LONGEST = 50_000_000
+#: White space before the declaration, which urdfdom, yourdfpy and MuJoCo pass over and expat refuses.
+_LATE = re.compile(r"\A(\s+)(<\?xml\b[^>]*\?>)")
 
 
 class Element(ElementTree.Element):
     #: 0 where it is not the file's.
     line: int = 0
+    #: The file's name where another one includes it; "" in the file itself.
+    file: str = ""
+
+    @property
+    def place(self) -> dict[str, Any]:
+        """Where it stands, as findings have it in `where`."""
+        place: dict[str, Any] = {"line": self.line} if self.line else {}
+        return {**place, "file": self.file} if self.file else place
 
 
 class XmlError(Exception):
@@ -35,10 +45,12 @@ class XmlError(Exception):
 
 
 def read_text(path: Path) -> str:
-    """The text of a UTF-8 file; `RobotError` if it cannot be read, FileNotFoundError if it is not there."""
+    """The text of a UTF-8 file, which starts with its XML declaration, if any; `RobotError` if it cannot be
+    read, FileNotFoundError if it is not there."""
     try:
         content = read_bytes(path, LONGEST)
-        return content.decode("utf-8-sig")
+        # Behind the declaration the white space keeps the lines' numbers.
+        return _LATE.sub(r"\2\1", content.decode("utf-8-sig"))
     except FileNotFoundError:
         raise
     except UnicodeDecodeError as error:
@@ -112,17 +124,19 @@ Owner = Mapping[str, Any]
 # What the C++ reader takes: Python's float would also take nan, inf, 1_0 and digits of other scripts.
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 NOBODY: Owner = {}
+#: URDF 1.1 and later know quat_xyzw.
+QUATERNIONS = 1
 
 
 @dataclass
 class Attributes:
-    """Readings of attributes; `found` is what was wrong so far."""
+    """Readings of attributes in a file of version 1.`minor`; `found` is what was wrong so far."""
 
     found: list[Finding] = field(default_factory=list)
+    minor: int = 0
 
     def add(self, element: Element | None, code: str, owner: Owner = NOBODY, /, **values: Any) -> None:
-        line = {} if element is None or not element.line else {"line": element.line}
-        self.found.append(Finding(code, values, {**line, **owner}))
+        self.found.append(Finding(code, values, {**({} if element is None else element.place), **owner}))
 
     def text(self, element: Element, attribute: str, owner: Owner) -> str | None:
         """A required attribute; None, and a finding, when it is missing or empty."""
@@ -176,11 +190,18 @@ class Attributes:
         return None if values is None else values[0]
 
     def origin(self, parent: Element, owner: Owner) -> None:
-        """The `<origin>` of a link's part or of a joint: xyz in m, rpy in rad."""
+        """The `<origin>` of a link's part or of a joint: xyz in m, rpy in rad or, from version 1.1 on, a
+        quaternion."""
         origin = child(parent, "origin")
-        if origin is not None:
-            self.vector(origin, "xyz", 3, owner)
-            self.vector(origin, "rpy", 3, owner)
+        if origin is None:
+            return
+        self.vector(origin, "xyz", 3, owner)
+        self.vector(origin, "rpy", 3, owner)
+        quaternion = None if self.minor < QUATERNIONS else self.vector(origin, "quat_xyzw", 4, owner)
+        if quaternion is not None and origin.get("rpy") is not None:
+            self.add(origin, "turned_twice", owner)
+        if quaternion is not None and not math.hypot(*quaternion):
+            self.add(origin, "quaternion_zero", owner)
 
 
 def _readable(number: float) -> bool:

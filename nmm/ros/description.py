@@ -1,0 +1,123 @@
+"""The URDF text of a whole robot, as nmm moves and draws it, whatever it was put together from."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from xml.etree.ElementTree import Element, SubElement, tostring
+
+import numpy as np
+import pinocchio as pin
+
+from nmm.arrays import Array
+from nmm.playback.placements import joint_screw
+from nmm.playback.sticks import appearance
+from nmm.robots.loading.provenance import provenance_of
+from nmm.robots.robot import Robot
+from nmm.ros.links import Link, Links
+
+fcl = pin.hppfcl
+PACKAGE = "package://"
+
+
+def description(robot: Robot, links: Links) -> tuple[str, list[str]]:
+    """The text: links, joints with limits and mimics, what is drawn; and the names of shapes that URDF has no
+    words for. Joints turn as in the robot's files, so that their names and signs are those of JointStates.
+    Meshes have the package:// names of the files, or else file:// names."""
+    root, left_out = Element("robot", name=robot.name), []
+    written = {name: SubElement(root, "link", name=name) for name in links.links}
+    files = packaged(robot)
+    for shape in appearance(robot).shapes.geometryObjects:
+        name = links.holder(shape.parentFrame, shape.parentJoint)
+        parts = list(_parts(shape, files))
+        if not parts:
+            left_out.append(str(shape.name))
+        for geometry, at in parts:
+            visual = SubElement(written[name], "visual")
+            placed = shape.placement.homogeneous @ at
+            _write_origin(visual, np.linalg.inv(links.links[name].place) @ placed)
+            SubElement(visual, "geometry").append(geometry)
+            if shape.overrideMaterial or geometry.tag != "mesh":
+                color = " ".join(f"{part:.6g}" for part in shape.meshColor)
+                SubElement(SubElement(visual, "material", name=color), "color", rgba=color)
+    for link in links.links.values():
+        if link.parent:
+            _write_joint(root, robot, link, links.placement(link))
+    return tostring(root, encoding="unicode"), left_out
+
+
+def packaged(robot: Robot) -> dict[str, tuple[str, str]]:
+    """By the files of meshes that lie where ROS_PACKAGE_PATH leads: its folder, and the package and place."""
+    found = {}
+    for name, file in provenance_of(robot).meshes.items():
+        inside = name.removeprefix(PACKAGE).lstrip("/")
+        if name.startswith(PACKAGE) and str(file).endswith(f"/{inside}"):
+            found[str(file)] = str(file).removesuffix(f"/{inside}"), inside
+    return found
+
+
+def _write_joint(root: Element, robot: Robot, link: Link, place: Array) -> None:
+    model, sign = robot.display_model, -1.0 if link.joint in robot.reversed_joints else 1.0
+    joint = SubElement(root, "joint", name=link.joint, type="fixed")
+    _write_origin(joint, place)
+    SubElement(joint, "parent", link=link.parent)
+    SubElement(joint, "child", link=link.name)
+    if not link.moves:
+        return
+    linear, angular = joint_screw(model, link.on)
+    turns = bool(angular.any())
+    if turns and linear.any():
+        joint.set("type", "floating")  # a screw: URDF has none, and TF moves it
+        return
+    i, v = model.joints[link.on].idx_q, model.joints[link.on].idx_v
+    ends = sorted(sign * float(end[i]) for end in (model.lowerPositionLimit, model.upperPositionLimit))
+    unlimited = turns and np.isinf(ends).all()
+    joint.set("type", "continuous" if unlimited else "revolute" if turns else "prismatic")
+    SubElement(joint, "axis", xyz=_text(sign * (angular if turns else linear)))
+    most = {"effort": _number(model.upperEffortLimit[v]), "velocity": _number(model.velocityLimit[v])}
+    limit = SubElement(joint, "limit", most)
+    if not unlimited:
+        limit.attrib |= {"lower": _number(ends[0]), "upper": _number(ends[1])}
+    for one in robot.mimic_joints:
+        if one.joint == link.joint:
+            one = one.reversed(robot.reversed_joints)
+            numbers = {"multiplier": _number(one.multiplier), "offset": _number(one.offset)}
+            SubElement(joint, "mimic", {"joint": one.leader, **numbers})
+
+
+def _parts(
+    shape: pin.GeometryObject, files: Mapping[str, tuple[str, str]]
+) -> Iterator[tuple[Element, Array]]:
+    """A shape in URDF's words, each with its place (4, 4) in it; nothing where there are none."""
+    form, middle = shape.geometry, np.eye(4)
+    if isinstance(form, fcl.Box):
+        yield Element("box", size=_text(2.0 * form.halfSide)), middle
+    elif isinstance(form, fcl.Sphere):
+        yield Element("sphere", radius=_number(form.radius)), middle
+    elif isinstance(form, fcl.Cylinder | fcl.Capsule):
+        radius, half = _number(form.radius), float(form.halfLength)
+        yield Element("cylinder", radius=radius, length=_number(2.0 * half)), middle
+        if isinstance(form, fcl.Capsule):  # URDF 1.0 has none
+            for end in (half, -half):
+                at = pin.SE3(np.eye(3), np.array([0.0, 0.0, end]))
+                yield Element("sphere", radius=radius), at.homogeneous
+    elif shape.meshPath and Path(shape.meshPath).is_absolute():
+        _, inside = files.get(shape.meshPath, ("", ""))
+        name = f"{PACKAGE}{inside}" if inside else f"file://{shape.meshPath}"
+        yield Element("mesh", filename=name, scale=_text(shape.meshScale)), middle
+
+
+def _write_origin(parent: Element, place: Array) -> None:
+    rpy = pin.rpy.matrixToRpy(np.ascontiguousarray(place[:3, :3]))
+    SubElement(parent, "origin", xyz=_text(place[:3, 3]), rpy=_text(rpy))
+
+
+def _text(values: Array) -> str:
+    return " ".join(_number(value) for value in values)
+
+
+def _number(value: float) -> str:
+    """All digits; what is infinite, or has lost digits, as the nearest number that readers of URDF take."""
+    most = sys.float_info.max
+    return repr(float(np.clip(value, -most, most)) if abs(value) > 1e-300 else 0.0)

@@ -1,0 +1,208 @@
+"""What a log has of a robot: its joints, its odometry and the frames, as they were recorded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nmm.arrays import vector
+from nmm.errors import InputError, expect
+from nmm.findings import Finding
+from nmm.robots.robot import Robot
+from nmm.ros import reading
+from nmm.ros.frames import Edge, Tree, carried, reference
+from nmm.ros.joint_states import parts, timed_joints
+from nmm.ros.reading import plain
+from nmm.ros.storage import Log, Topic
+from nmm.ros.tracks import Track
+
+JOINT_STATE, ODOMETRY = "sensor_msgs/msg/JointState", "nav_msgs/msg/Odometry"
+#: As tf2 calls it, and as tf did before.
+TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+
+
+@dataclass(frozen=True)
+class Names:
+    """Topics and frames of one robot's messages; topics without a slash in front are in its namespace."""
+
+    joints: tuple[str, ...]
+    odometry: str
+    tf: str
+    map: str
+    odom: str
+    base: str | None
+    namespace: str
+    prefix: str | None
+
+    def topic(self, name: str) -> str:
+        space = self.namespace.strip("/")
+        return name if name.startswith("/") else f"/{space}/{name}" if space else f"/{name}"
+
+
+class Recorded:
+    """The messages of one robot in a log.
+
+    own : names of q's joints
+    positions, velocities : by joint, tracks of rows (1,), rad or m, with the file's signs
+    positions_of : the joints in `positions` of which q is made
+    odometry : the poses of the Odometry's child in its frame, if there are any
+    twists : its velocities (3,) at the platform's reference point, along its axes
+    inputs : u (n_u,), of a log of nmm's
+    tree : all transforms
+    """
+
+    def __init__(self, robot: Robot, file: Path, names: Names) -> None:
+        self.robot, self.names = robot, names
+        self.own = robot.q_names[min(3, robot.platform.n_p) :]
+        self.positions, self.velocities = dict[str, Track](), dict[str, Track]()
+        self.inputs, self.twists, self.tree = Track(), Track(), Tree()
+        self._odometry: dict[tuple[str, str], tuple[Edge, list[Any]]] = {}
+        self._needed = timed_joints(robot)
+        self._known = self._needed | {*robot.locked}
+        self._not_finite: dict[str, int] = {}
+        log = Log(file)
+        takes = self._takes(log.topics)
+        self.prefix = names.namespace.strip("/") if names.prefix is None else names.prefix
+        for topic, recorded, message in log.messages([*takes]):
+            for take in (take for (asked, _), take in takes.items() if asked == topic):
+                take(topic, recorded, message)
+        self.findings = [*log.findings]
+        self.odometry = self._one_odometry()
+        self._finish(log)
+
+    @property
+    def odometry_topic(self) -> str:
+        return self.names.topic(self.names.odometry)
+
+    def position(self, joint: str) -> Track:
+        return self.positions[joint]
+
+    @property
+    def positions_of(self) -> list[str]:
+        return [name for name in self.positions if name in self._needed]
+
+    def tracks(self) -> Iterator[tuple[str, Track]]:
+        """The tracks beside transforms, with the topics that they come from."""
+        joints = ", ".join(map(self.names.topic, self.names.joints))
+        for some in (self.positions, self.velocities):
+            yield from ((joints, track) for track in some.values())
+        yield self.odometry_topic, self.twists
+        yield self.names.topic("inputs"), self.inputs
+
+    def _takes(self, topics: list[Topic]) -> dict[Topic, Callable[[str, int, Any], None]]:
+        """Who takes the messages of which topics; `InputError` for a robot's that the log lacks."""
+        names = self.names
+        there = {topic for topic, _ in topics}
+        tf, static = (
+            own if (own := names.topic(name)) in there else f"/{name.lstrip('/')}"  # that of all robots
+            for name in (names.tf, f"{names.tf}_static")
+        )
+        joints = [names.topic(name) for name in names.joints]
+        asked: list[tuple[str, tuple[str, ...], Callable[[str, int, Any], None]]] = [
+            *((topic, (JOINT_STATE,), self._take_joints) for topic in joints),
+            (names.topic("inputs"), (JOINT_STATE,), self._take_inputs),
+        ]
+        if self.robot.platform.n_p:
+            asked += [
+                (self.odometry_topic, (ODOMETRY,), self._take_odometry),
+                (tf, TRANSFORMS, self._take_transforms),
+                (static, TRANSFORMS, self._take_transforms),
+            ]
+        takes = {
+            (topic, kind): take for topic, kinds, take in asked for kind in kinds if (topic, kind) in topics
+        }
+        kinds = {kind for _, kind in takes if (_, kind) != (names.topic("inputs"), JOINT_STATE)}
+        needed = [(f"{JOINT_STATE} on {' or '.join(joints)}", {JOINT_STATE})] if self.own else []
+        if self.robot.platform.n_p:
+            needed.append((f"{ODOMETRY} on {self.odometry_topic} or {TRANSFORMS[0]} on {tf}",
+                           {ODOMETRY, *TRANSFORMS}))  # fmt: skip
+        for what, some in needed:
+            if not some & kinds:
+                near = sorted(topics, key=lambda one: one[1] not in some)
+                told = [f"{topic} ({kind})" for topic, kind in near]
+                raise InputError(expected=f"a topic of {what}", available=told)
+        return takes
+
+    def _take_joints(self, _: str, recorded: int, message: Any) -> None:
+        positions, velocities = parts(message, self._known, self.prefix)
+        if not positions and not velocities:
+            return
+        stamp = reading.nanoseconds(message)
+        for some, tracks in ((positions, self.positions), (velocities, self.velocities)):
+            for name, value in some.items():
+                if math.isfinite(value):
+                    tracks.setdefault(name, Track()).add(stamp, recorded, np.array([value]))
+                elif tracks is self.positions and name in self._needed:
+                    self._not_finite[name] = self._not_finite.get(name, 0) + 1
+
+    def _take_inputs(self, _: str, recorded: int, message: Any) -> None:
+        names = self.robot.u_names
+        if {*names} <= {*message.name} and len(message.velocity) == len(message.name):
+            rates = reading.rates(message)
+            self.inputs.add(reading.nanoseconds(message), recorded, np.array([rates[name] for name in names]))
+
+    def _take_odometry(self, topic: str, recorded: int, message: Any) -> None:
+        pair = plain(message.header.frame_id), plain(message.child_frame_id)
+        edge, twists = self._odometry.setdefault(pair, (Edge(*pair, topic=topic), []))
+        stamp = reading.nanoseconds(message)
+        edge.track.add(stamp, recorded, reading.placement(message))
+        twists.append((stamp, recorded, reading.velocities(message)))
+
+    def _take_transforms(self, topic: str, recorded: int, message: Any) -> None:
+        self.tree.add(message, topic, topic.endswith("_static"), recorded)
+
+    def _one_odometry(self) -> Edge | None:
+        """The robot's odometry; `InputError` where a topic has that of several frames."""
+        own = {pair: of for pair, of in self._odometry.items() if pair[1].startswith(plain(self.prefix))}
+        several = own if self.prefix and own else self._odometry
+        if not several:
+            return None
+        if len(several) > 1:
+            told = [f"{child} in {frame}" for frame, child in several]
+            raise InputError("odometry of several frames on one topic", where=self.odometry_topic,
+                             expected="prefix=, or another topic", available=told)  # fmt: skip
+        ((edge, twists),) = several.values()
+        pose = np.eye(4)
+        if edge.child:
+            pose = reference(self.robot, edge.child, self.prefix, self.tree, self.names.base)
+        for stamp, recorded, (linear, angular) in twists:
+            self.twists.add(
+                stamp, recorded, vector(carried(linear, angular, pose), 3, f"{edge.topic}: twist")
+            )
+        return edge
+
+    def _finish(self, log: Log) -> None:
+        """Joints without a number, and angles that were counted on."""
+        for name, count in self._not_finite.items():
+            expect(name in self.positions, f"position of {name}", "a finite number", math.nan)
+            self.findings.append(Finding("values_not_finite", {"name": name, "count": count}))
+        if self.own and not self.positions_of:
+            raise InputError(
+                f"has no joint of {self.robot.name}", where=log.path, expected=" or ".join(self.own[:4])
+            )
+        endless = {
+            name
+            for name, unit, limited in zip(
+                self.robot.q_names, self.robot.q_units, self.robot.limited, strict=True
+            )
+            if unit == "rad" and not limited.any()
+        }
+        for name in endless & self.positions.keys():
+            _count_on(self.positions[name])
+
+
+def _count_on(track: Track) -> None:
+    """Angles that were taken within one turn, the short way from one to the next."""
+    order = np.argsort(track.stamps, kind="stable")
+    angles = np.array(track.rows)[order, 0]
+    slack = 1e-3
+    if np.abs(angles).max() <= np.pi + slack or (
+        angles.min() >= -slack and angles.max() <= 2 * np.pi + slack
+    ):
+        for k, angle in zip(order.tolist(), np.unwrap(angles).tolist(), strict=True):
+            track.rows[k] = np.array([angle])

@@ -1,0 +1,197 @@
+"""Logs of ROS opened: rosbag2's folders and files, MCAP files without their end, ROS 1's bags."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from nmm.errors import InputError, RunError
+from nmm.files import expect_file
+from nmm.findings import Finding
+from nmm.ros.log import rosbags, typestore
+
+#: A topic and the type of its messages.
+Topic = tuple[str, str]
+#: One message: its topic, when it was recorded (ns), itself.
+Taken = tuple[str, int, Any]
+#: What mends a file, by its suffix.
+MENDS = {
+    ".mcap": "mcap recover {}",
+    ".db3": "sqlite3 {} .recover",
+    ".bag": "rosbag reindex {}",
+    ".active": "rosbag reindex {}",
+}
+#: TFMessage as ROS 1 calls it, and as it called it before tf2.
+_TF1 = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+
+
+class Log:
+    """The messages of a log; `InputError` where nothing of it can be read.
+
+    topics : all of it, with their types
+    findings : where a file lacks its end
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.findings = path, list[Finding]()
+        try:
+            expect_file(path)
+        except OSError as error:
+            raise InputError(f"cannot be read: {error.strerror}", where=path) from None
+        rosbags("rosbag2")
+        self._parts = self._opened(path)
+        self.topics = [*dict.fromkeys(topic for part in self._parts for topic in part.topics)]
+
+    def messages(self, wanted: Collection[Topic]) -> Iterator[Taken]:
+        """All messages of those topics with those types, a file after another."""
+        for part in self._parts:
+            with _Refusing(part.path):
+                yield from part.messages(wanted)
+            if isinstance(part, _Streamed) and part.reason:
+                self._tell(part.path, part.reason)
+
+    def _opened(self, path: Path) -> list[_Indexed | _Streamed]:
+        inside = sorted(path.iterdir(), key=_counted) if path.is_dir() else []
+        files = [one for one in inside if one.suffix in (".bag", ".mcap", ".db3")]
+        whole = not path.is_dir() or (path / "metadata.yaml").exists()
+        try:
+            if whole:
+                return [_Indexed(path)]
+        except Exception as error:
+            if not files and path.suffix != ".mcap":
+                raise _refused(path, error) from None
+            reason = str(error) or type(error).__name__
+        else:
+            reason = "there is no metadata.yaml"
+        if not files and path.is_dir():
+            mend = f"ros2 bag reindex {path.name}"
+            raise InputError(f"is no bag, or one whose metadata.yaml is missing: {mend}", where=path)
+        parts: list[_Indexed | _Streamed] = []
+        for file in files or [path]:
+            with _Refusing(file):
+                parts.append(_Streamed(file) if file.suffix == ".mcap" else _Indexed(file))
+        if files and files[0].suffix != ".bag":
+            self._tell(path, reason)
+        return parts
+
+    def _tell(self, path: Path, reason: str) -> None:
+        mend = "ros2 bag reindex {}" if path.is_dir() else MENDS[path.suffix]
+        self.findings.append(
+            Finding("bag_cut", {"file": path.name, "reason": reason, "mend": mend.format(path.name)})
+        )
+
+
+class _Indexed:
+    """What the package rosbags reads, by the index."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        first = path.suffix in (".bag", ".active")
+        self._reader: Callable[[Path], Any] = rosbags("rosbag1" if first else "rosbag2").Reader
+        self._decoded = of_ros1() if first else typestore().deserialize_cdr
+        with self._reader(path) as bag:
+            self.topics = [(one.topic, one.msgtype) for one in bag.connections]
+
+    def messages(self, wanted: Collection[Topic]) -> Iterator[Taken]:
+        with self._reader(self.path) as bag:
+            some = [one for one in bag.connections if (one.topic, one.msgtype) in wanted]
+            for connection, time, data in bag.messages(connections=some) if some else ():
+                yield connection.topic, time, self._decoded(data, connection.msgtype)
+
+
+class _Streamed:
+    """An MCAP file from its beginning on, as far as whole chunks go.
+
+    reason : why no further, once it was read; "" where its end is there
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.reason = path, ""
+        self._decoders = {"cdr": typestore().deserialize_cdr, "ros1": of_ros1()}
+        self.topics = [*dict.fromkeys((topic, kind) for topic, kind, _ in self._records() if topic)]
+        if not self.topics:
+            raise InputError(self.reason or "has no topics", where=path)
+
+    def messages(self, wanted: Collection[Topic]) -> Iterator[Taken]:
+        for topic, kind, message in self._records():
+            if message is not None and (topic, kind) in wanted:
+                encoding, record = message
+                yield topic, record.log_time, self._decoders[encoding](record.data, kind)
+
+    def _records(self) -> Iterator[tuple[str, str, Any]]:
+        """Topic, type and None for each channel, (encoding, record) for a message."""
+        stream, records = mcap("stream_reader"), mcap("records")
+        kinds: dict[int, str] = {}
+        channels: dict[int, tuple[str, str, str]] = {}
+        with self.path.open("rb") as file:
+            try:
+                for record in stream.StreamReader(file, validate_crcs=True).records:
+                    if isinstance(record, records.Schema):
+                        kinds[record.id] = _with_msg(record.name)
+                    elif isinstance(record, records.Channel):
+                        kind = kinds.get(record.schema_id, "")
+                        channels[record.id] = record.topic, kind, record.message_encoding
+                        yield record.topic, kind, None
+                    elif isinstance(record, records.Message):
+                        topic, kind, encoding = channels[record.channel_id]
+                        if encoding in self._decoders:
+                            yield topic, kind, (encoding, record)
+            except Exception as error:  # of bytes that are cut or are others
+                cut = type(error).__name__ in ("EndOfFile", "error")  # mcap's, and that of struct
+                self.reason = "it lacks its end" if cut else "bytes of it are others than written"
+
+
+class _Refusing:
+    """In the block, whatever a reader says of a stranger's bytes is an `InputError`."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def __enter__(self) -> None:
+        return
+
+    def __exit__(self, kind: object, error: BaseException | None, _: object) -> None:
+        if isinstance(error, Exception) and not isinstance(error, InputError | RunError):
+            raise _refused(self._path, error) from None
+
+
+def _refused(path: Path, error: Exception) -> InputError:
+    if isinstance(error, InputError | RunError):
+        return error if isinstance(error, InputError) else InputError(str(error), where=path)
+    reason = str(error) or type(error).__name__
+    mend = f"; {MENDS[path.suffix].format(path.name)} may mend it" if path.suffix in MENDS else ""
+    return InputError(f"is no bag of ROS, or a damaged one ({reason}){mend}", where=path)
+
+
+def mcap(part: str) -> Any:
+    """A module of the package mcap; `InputError` says how to install it."""
+    try:
+        return import_module(f"mcap.{part}")
+    except ImportError:
+        raise InputError(
+            "an MCAP file without its end needs the package mcap: pip install mcap, or mcap recover"
+        ) from None
+
+
+def of_ros1() -> Callable[[bytes, str], Any]:
+    """What decodes a message of ROS 1 of a type."""
+    typesys = rosbags("typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS1_NOETIC)
+    for name in _TF1:
+        store.register(typesys.get_types_from_msg("geometry_msgs/TransformStamped[] transforms", name))
+    decoded: Callable[[bytes, str], Any] = store.deserialize_ros1
+    return decoded
+
+
+def _with_msg(kind: str) -> str:
+    """A type's name as ROS 2 writes it."""
+    package, slash, name = kind.partition("/")
+    return kind if not slash or "/" in name else f"{package}/msg/{name}"
+
+
+def _counted(path: Path) -> tuple[int, str]:
+    """The order of a split bag's files: _2 before _10."""
+    number = path.stem.rpartition("_")[2]
+    return (int(number) if number.isdigit() else -1, path.name)
