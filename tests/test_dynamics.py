@@ -318,6 +318,20 @@ def test_a_robot_that_reaches_far_with_a_load_tips() -> None:
     assert run.torques().findings == ()
 
 
+@pytest.mark.parametrize(("steps", "is_named"), [(2, True), (100, False)])
+def test_a_jump_of_inputs_is_named_as_the_cause_of_tipping(steps: int, is_named: bool) -> None:
+    robot = robot_of("differential_base+ur5")
+    t, u = np.arange(301) * 0.01, np.zeros((301, robot.n_u))
+    u[:, 0] = np.interp(np.arange(301), [150, 150 + steps], [1.0, -steps * 0.2])  # 20 m/s² and more
+    q = np.tile(robot.rest, (301, 1))
+    found = torques_along(robot, t, q, u)
+    (tips,) = (one for one in found.findings if one.code == "tips")
+    ((name, change),) = tips.values["jumps"].items() if is_named else ((robot.u_names[0], None),)
+    assert name == robot.u_names[0] and change == (pytest.approx(-1.4) if is_named else None)
+    assert ("limits.acceleration" in str(tips)) is is_named
+    assert bool(tips.values["jumps"]) is is_named
+
+
 def test_the_command_writes_what_it_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

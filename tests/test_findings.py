@@ -413,6 +413,13 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
         "the robot tips at t = 1.5 s: the zero-moment point is 12.5 mm outside the edge from front to left",
     ),
     (
+        "tips",
+        {"margin": None, "edge": ["front", "left"], "jumps": {"v": -0.5, "omega": 0.1}},
+        {"t": 1.5},
+        "the robot tips at t = 1.5 s: the ground would have to pull it down; inputs jump there (v by -0.5, "
+        "omega by 0.1): limits.acceleration spreads that over time",
+    ),
+    (
         "pictures_lost",
         {"lost": 3, "taken": 30, "gap": 0.25},
         {},

@@ -67,7 +67,13 @@ def test_it_runs_as_it_is_written(run: Command, name: str) -> None:
     q0 = loaded.q(scenario.parts.q0)
     loaded.check_limits(q0)
     assert np.ptp(trajectory.q[:, :2], axis=0).max() > 0.2  # the platform drives
-    assert given.get("limits", False) is bool(np.isfinite(loaded.u_limits).any() or loaded.limited.any())
+    limits = scenario.parts.limits.build(loaded).on(loaded)
+    assert np.isfinite(limits.accelerations).all()
+    usual = np.where(np.isfinite(loaded.u_limits), loaded.u_limits, limits.inputs[:, 1])
+    np.testing.assert_array_equal(limits.inputs[:, 1], usual)  # those of the file are kept
+    change = np.abs(np.diff(trajectory.u, axis=0, prepend=np.zeros((1, loaded.n_u))))  # from rest on
+    assert (change <= limits.accelerations * 0.01 * (1.0 + 1e-9)).all()
+    assert not any(one.code == "tips" for one in trajectory.torques().findings)
     if frame:
         assert given["task"]["frame"].endswith(frame)
         assert isinstance(given["robot"], str) is own_base
@@ -246,11 +252,11 @@ def test_shapes_whose_meshes_are_missing_are_left_out_in_writing(run: Command, t
     assert data["robot"]["arm"]["missing_meshes"] == "skip"
 
 
-def test_a_file_without_limits_has_none_in_its_scenario(run: Command, tmp_path: Path) -> None:
+def test_a_file_without_limits_has_accelerations_alone(run: Command, tmp_path: Path) -> None:
     started(run, str(arm(tmp_path / "arm.urdf", joints=(FREE, FREE))), "--platform", "unicycle")
     text = Path("first.yaml").read_text(encoding="utf-8")
-    assert "limits" not in yaml.safe_load(text)
-    assert "limits: the robot's file has none" in text
+    assert yaml.safe_load(text)["limits"].keys() == {"acceleration"}
+    assert "file has no other limits" in " ".join(line.removeprefix("# ") for line in text.splitlines())
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 JUMP = 10.0
 #: if by more than this share of the run's largest input.
 SMALL = 1e-3
+#: A change of inputs within so many samples to either side is a jump, if they are steady nearby, so many.
+BRIEF, NEARBY = 3, 30
 #: So many samples are computed at once: some megabytes.
 AT_ONCE = 4096
 
@@ -40,6 +42,7 @@ class Torques:
     dynamics : the robot's, with its load
     t (N,) : s
     torques, rates (N, A) : of the actuators, N m and rad/s, or N and m/s
+    inputs (N, n_u) : those of the motion
     jumps (N,) : whether inputs jump between the sample and the next
     zero_moment (N, 2) : where the ground's force acts, m in the world
     margins (N,) : how far this is inside the wheels' polygon, m; infinite without one
@@ -57,6 +60,7 @@ class Torques:
     t: Array
     torques: Array
     rates: Array
+    inputs: Array
     jumps: Flags
     zero_moment: Array
     margins: Array
@@ -113,8 +117,21 @@ class Torques:
         if self.margins[k] < 0.0:
             margin = float(self.margins[k])
             values = {"margin": margin if np.isfinite(margin) else None, "edge": list(self.edges[k])}
+            values["jumps"] = self._jumps_at(k)
             found.append(Finding("tips", values, {"t": float(self.t[k])}))
         return tuple(found)
+
+    def _jumps_at(self, k: int) -> dict[str, float]:
+        """By input, what it changes by around sample k, where that takes a few samples alone, and is more
+        than elsewhere nearby."""
+        size, names = np.abs(np.diff(self.inputs, axis=0)), self.dynamics.robot.u_names
+        first, last = max(k - BRIEF, 0), min(k + BRIEF, len(size))
+        beside = np.concatenate([size[max(k - NEARBY, 0) : first], size[last : k + NEARBY]])
+        if not len(beside):
+            return {}
+        changes = self.inputs[last] - self.inputs[first]
+        jump = (size[first:last].max(axis=0) > JUMP * beside.max(axis=0)) & (np.abs(changes) > SMALL)
+        return {names[j]: float(changes[j]) for j in np.flatnonzero(jump)}
 
     def summary(self) -> dict[str, Any]:
         """In numbers, ready for JSON."""
@@ -188,7 +205,7 @@ def torques_along(
     torques, rates, ground = (np.concatenate(one) for one in zip(*parts, strict=True))
     acts = support.zero_moment(ground) if robot.platform.n_p else np.zeros((len(t), 2))
     margins, edges = support.margins(q, acts)
-    return Torques(dynamics, t, torques, rates, jumps, acts, margins, tuple(edges))
+    return Torques(dynamics, t, torques, rates, u, jumps, acts, margins, tuple(edges))
 
 
 def accelerations(t: Array, u: Array) -> tuple[Array, Flags]:

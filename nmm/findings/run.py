@@ -176,12 +176,19 @@ def _wheels_slid(speeds: Mapping[str, float], t: float | None = None, **_: Any) 
     )
 
 
-def _tips(margin: float | None, edge: Sequence[str], t: float, **_: Any) -> str:
+def _tips(
+    margin: float | None, edge: Sequence[str], t: float, jumps: Mapping[str, float] | None = None, **_: Any
+) -> str:
     said = f"the robot tips at t = {t:.4g} s"
     if margin is None:
-        return f"{said}: the ground would have to pull it down"
-    outside = f"{-1e3 * margin:.3g} mm outside the edge from {edge[0]} to {edge[1]}"
-    return f"{said}: the zero-moment point is {outside}"
+        said += ": the ground would have to pull it down"
+    else:
+        outside = f"{-1e3 * margin:.3g} mm outside the edge from {edge[0]} to {edge[1]}"
+        said += f": the zero-moment point is {outside}"
+    if not jumps:
+        return said
+    names = few([f"{name} by {change:.3g}" for name, change in jumps.items()], shown=3)
+    return f"{said}; inputs jump there ({names}): limits.acceleration spreads that over time"
 
 
 #: What helps where two links of the robot touch before it has moved.

@@ -25,6 +25,8 @@ from nmm.platforms.wheel_layout import (
     is_named,
     standing_wheels,
     steering_pivots,
+    trail,
+    trails,
     wheels_on,
 )
 
@@ -37,9 +39,6 @@ _AHEAD, _BESIDE = 1e-3, NEAR
 _ANY_WAY = math.pi - PARALLEL
 #: One that turns as far turns without end.
 _ENDLESS = 2.0 * math.pi - 0.1
-#: A wheel whose centre is less than this share of its radius before or behind its pivot steers, and does not
-#: trail.
-_TRAIL = 0.1
 #: Platforms whose reference point is the middle of an axle, and of several.
 _ON_AXLE = ("unicycle", "differential", "car", "front_drive_car", "tractor")
 _AMID_AXLES = ("skid_steer", "mecanum")
@@ -72,22 +71,23 @@ def _role(layout: Layout, pivot: Pivot, steer: Collection[str]) -> Role:
     if pivot.carrier != MAIN_BODY or is_named(pivot.joint, SWIVELS):
         # Where nothing else could drive it, wheels on pivots do, whatever these are called.
         return "swivel" if wheels_on(layout, MAIN_BODY) or pivot.carrier != MAIN_BODY else "steering"
-    if not wheels_on(layout, MAIN_BODY):
-        return "steering"
-    centred = all(_trail(wheel) <= _TRAIL * _size(wheel) for wheel in wheels_on(layout, pivot.joint))
+    centred = _is_centred(layout, pivot)
+    if not wheels_on(layout, MAIN_BODY):  # casters beside what steers
+        others = [one for one in layout.pivots if wheels_on(layout, one.joint) and _is_centred(layout, one)]
+        return "steering" if centred or len(others) < 2 else "swivel"
     return "steering" if centred and pivot.upper - pivot.lower < _ENDLESS else "swivel"
+
+
+def _is_centred(layout: Layout, pivot: Pivot) -> bool:
+    """Whether it is right above its wheels."""
+    return not any(trails(wheel) for wheel in wheels_on(layout, pivot.joint))
 
 
 def _looks_steered(layout: Layout, pivot: Pivot) -> bool:
     """Whether a swivel is right above its wheels, and not called one."""
     wheels = wheels_on(layout, pivot.joint)
     named = is_named(pivot.joint, SWIVELS) or any(is_named(wheel.joint, SWIVELS) for wheel in wheels)
-    return bool(wheels) and not named and all(_trail(wheel) <= NEAR for wheel in wheels)
-
-
-def _trail(wheel: RollingJoint) -> float:
-    """How far a wheel's centre is before or behind its pivot, m."""
-    return abs((complex(wheel.x, wheel.y) * cmath.rect(1.0, -wheel.heading)).real)
+    return bool(wheels) and not named and all(trail(wheel) <= NEAR for wheel in wheels)
 
 
 def _size(wheel: RollingJoint) -> float:

@@ -15,6 +15,9 @@ from nmm.findings import Finding
 NEAR = 5e-3
 #: The same of directions, rad: files say 3.14 for pi, and real wheels have some toe and camber.
 PARALLEL = 0.02
+#: A wheel whose centre is less than this share of its radius before or behind its pivot steers, and does not
+#: trail.
+TRAIL = 0.1
 #: The coordinate that turns the main body, by which its joints name their carrier.
 MAIN_BODY = "theta"
 #: Parts of an upright joint's name, in lower case, that say what it is.
@@ -194,6 +197,16 @@ def rolls_forward(wheel: RollingJoint) -> bool:
 def stands_below(wheel: RollingJoint) -> bool:
     """Whether the wheel rolls forward with its axis through its pivot's."""
     return abs(wheel.x) <= NEAR and rolls_forward(wheel)
+
+
+def trail(wheel: RollingJoint) -> float:
+    """How far a wheel's centre is before or behind its pivot, m."""
+    return abs((complex(wheel.x, wheel.y) * cmath.rect(1.0, -wheel.heading)).real)
+
+
+def trails(wheel: RollingJoint) -> bool:
+    """Whether that is more than drawings are wrong by, so that the ground turns the pivot."""
+    return trail(wheel) > (0.1 * TRAIL if math.isnan(wheel.radius) else wheel.radius * TRAIL)
 
 
 def same(values: Iterable[float]) -> bool:

@@ -7,18 +7,18 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from nmm.errors import InputError, NmmError, RunError, ScenarioError
 from nmm.robots.configuration import Configuration
 from nmm.robots.loading.ground import slip_warnings
-from nmm.robots.loading.provenance import accelerations_of
 from nmm.robots.robot import Robot
 from nmm.runs.trajectory import Outcome, Trajectory
 from nmm.scaffold.end_effector import Hand, HandsPath, hands, paths
 from nmm.scaffold.parts import Chosen, chosen_robot
+from nmm.scaffold.standing import Standing, tipping
 from nmm.scaffold.start import Start, start_for
 from nmm.scaffold.text import text_of
 from nmm.scenario import Scenario
@@ -27,6 +27,8 @@ from nmm.text_format import one_line
 
 #: At most this many scenarios are tried, for at most this many frames.
 _TRIES, _HANDS = 18, 3
+#: Of what should not tip the robot, what is tried, if it does.
+_SHARES = (1.0, 0.5, 0.25)
 #: A path is followed at its speed when limits leave this share of the task's rate everywhere.
 _UNHURRIED = 0.999
 
@@ -89,23 +91,29 @@ def first_scenario(
             raise InputError(expected="a robot's name or path", got=value)
     place = usual_file(arm or robot) if file is None else Path(file)
     chosen = chosen_robot(str(robot), place.parent, arm=None if arm is None else str(arm), at=at, **loading)
-    found = hands(chosen.robot)
+    found, standing = hands(chosen.robot), Standing(chosen.robot)
     last: NmmError = InputError("there is no frame that its inputs move")
-    best: Draft | None = None
+    best, best_tips = cast(Draft | None, None), False
     tries = 0
     for hand in found[:_HANDS] if found and found[0].joints else found:
-        start = start_for(chosen.robot, hand) if tries < _TRIES else None
+        start = start_for(chosen.robot, hand, standing) if tries < _TRIES else None
         if start is None:
             continue
         for data, words in islice(_scenarios(chosen, hand, start), _TRIES - tries):
             tries += 1
-            draft = _tried(data, words, chosen, hand, start, place)
+            for share in _SHARES:
+                limits, about = _limits(standing, start, share)
+                keys = {**data, "limits": limits}
+                draft = _tried(keys, {**words, "limits": about}, chosen, hand, start, place)
+                tips = isinstance(draft, Draft) and standing.is_known and tipping(draft.trajectory.torques())
+                if not tips or standing.margin(start.q) <= 0.0:
+                    break
             if not isinstance(draft, Draft):
                 last = draft
-            elif _unhurried(draft.trajectory):
+            elif _unhurried(draft.trajectory) and not tips:
                 return draft
-            else:
-                best = best or draft
+            elif best is None or (best_tips and not tips):
+                best, best_tips = draft, bool(tips)
         if best is not None:
             return best
     what = f"no first scenario found that runs: {one_line(str(last))}"
@@ -134,7 +142,6 @@ def _scenarios(chosen: Chosen, hand: Hand, start: Start) -> Iterator[tuple[dict[
                     "task": f"The frame is {hand.why}. The {path.reference['kind']}: {path.why}.",
                     "objective": "" if hand.joints else "No objective: there is no arm to keep in a posture.",
                     "resolver": why,
-                    **({} if _has_limits(robot) or accelerations_of(robot) else {"limits": _NO_LIMITS}),
                 },
             )
 
@@ -144,10 +151,24 @@ _RESOLVERS = {
     "pg": "pg, the projected gradient, is the one to begin with.",
     "dls": "dls, because pg met a singularity on this path.",
 }
-_NO_LIMITS = (
-    "limits: the robot's file has none. limits: {velocity: {v: 0.5}} would keep the input v within 0.5 "
-    "(docs/limits.md)."
-)
+
+
+def _limits(standing: Standing, start: Start, share: float) -> tuple[dict[str, Any], str]:
+    """The key `limits`: accelerations that do not tip the robot at its start, times a share; and a line."""
+    robot, margin = standing.robot, standing.margin(start.q)
+    if not standing.is_known:
+        why = "usual ones, as the file does not tell where the robot tips (masses, three wheels)"
+    elif margin <= 0.0:
+        why = "usual ones: it tips at rest, at its start already"
+    else:
+        why = (
+            f"at most {100 * 0.5 * share:.3g} % of what tips it at its start, where it stands {margin:.2g} m"
+        )
+        why += " inside its wheels"
+    about = f"acceleration, m/s² and rad/s²: {why}."
+    if not (np.isfinite(robot.u_limits).any() or robot.limited.any()):
+        about += " The robot's file has no other limits; velocity: {NAME: 0.5} keeps an input within 0.5."
+    return {"acceleration": standing.accelerations(start.q, share)}, about
 
 
 def _data(chosen: Chosen, hand: Hand, start: Start, path: HandsPath, kind: str) -> dict[str, Any]:
@@ -176,9 +197,6 @@ def _data(chosen: Chosen, hand: Hand, start: Start, path: HandsPath, kind: str) 
     if share < 1.0:
         resolver["weights"] = {"platform": share}
     data["resolver"] = resolver
-    rates = {name: round(limit, 6) for name, limit in accelerations_of(robot).items()}
-    if rates or _has_limits(robot):
-        data["limits"] = {"acceleration": rates} if rates else True
     return data
 
 
@@ -200,10 +218,6 @@ def _wheel_share(robot: Robot) -> float:
         return 1.0
     G = robot.platform.G(np.zeros(n_p))
     return float(f"{min(1.0, float(np.abs(G[:2]).sum(axis=1).max()) ** 2):.1g}") or 1.0
-
-
-def _has_limits(robot: Robot) -> bool:
-    return bool(np.isfinite(robot.u_limits).any() or robot.limited.any())
 
 
 def _tried(

@@ -1,19 +1,27 @@
 """Which frame of a robot is led, and along which path: the most likely to work first, and why."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from nmm.arrays import Array
+from nmm.findings import Finding
+from nmm.platforms.wheel_layout import STEERING, SWIVELS, is_named
 from nmm.robots.reach import arm_branches, arm_end, reach
 from nmm.robots.robot import Robot
 from nmm.text_format import counted
 
 #: A range this small is none, m or rad.
 _NO_ROOM = 1e-6
+#: A point so near to the axle, m, cannot be led aside.
+_NO_LEVER = 0.02
+#: Parts of the names of what rolls, and of what is above it.
+_ROLLING = ("wheel", "tire", "tyre", "suspension", *STEERING, *SWIVELS)
+#: From rest to a path's speed, s.
+_RUN_UP = 2.0
 #: Radii of circles, lengths of lines, and of those on a fixed base, as shares of the arm's reach.
 _RADII, _LENGTHS, _FIXED = (1.5, 3.0, 6.0), (1.5, 0.5), (0.2, 0.1, 0.04)
 #: Of the end-effector: m/s with a metre of reach, at most; and slower.
@@ -35,8 +43,11 @@ def hands(robot: Robot) -> list[Hand]:
     """Frames to lead, the best first: ends of arms, or of a robot without any what its platform carries."""
     n_p = robot.platform.n_p
     found, free = [], movable(robot)
+    rolling = wheel_frames(robot)
     for chain in arm_branches(robot):
         frame = arm_end(robot, chain[-1])
+        if frame in rolling:
+            continue
         joints = tuple(name for name in map(robot.model.names.__getitem__, chain) if name in free)
         if frame and joints:
             length = reach(robot, frame)
@@ -51,8 +62,42 @@ def hands(robot: Robot) -> list[Hand]:
         made.append(Hand(frame, joints, why))
     if made or not n_p:
         return made
-    why = "there is no arm: a point of the platform's body, ahead of its axle"
-    return [Hand(name, (), why) for name in sorted(_carried(robot), key=lambda name: -_ahead(robot, name))]
+    ahead, where = [name for name in _carried(robot) if name not in rolling], "ahead of its axle"
+    ahead = [name for name in ahead if _ahead(robot, name) > _NO_LEVER]
+    if not ahead:
+        ahead, where = [_root(robot)], "as none is ahead of its axle"
+    why = f"there is no arm: a point of the platform's body, {where}"
+    return [Hand(name, (), why) for name in sorted(ahead, key=lambda name: -_ahead(robot, name))]
+
+
+def wheel_frames(robot: Robot) -> set[str]:
+    """Frames of wheels, of what steers them, and of what is between these and the base, held or not."""
+    parts = {str(name) for note in robot.notes for name in _held_by(note)}
+    model, found = robot.model, set[str]()
+    for frame in model.frames:  # each behind the one that carries it
+        above = model.frames[frame.parentFrame]
+        below = above.name in found and above.parentJoint == frame.parentJoint
+        own = {frame.name, str(model.names[frame.parentJoint])}
+        if below or own & parts or is_named(" ".join(own), _ROLLING):
+            found.add(frame.name)
+    return found
+
+
+def _held_by(note: Finding) -> Iterable[str]:
+    if note.code == "not_a_wheel":
+        return [note.values["name"]]
+    keys = {"undercarriage_held": "values", "radius_unknown": "names", "wheels_held": "names"}
+    return note.values[keys[note.code]] if note.code in keys else ()
+
+
+def _root(robot: Robot) -> str:
+    """The root link."""
+    model = robot.model
+    return next(
+        frame.name
+        for frame in model.frames
+        if frame.type.name == "BODY" and model.names[frame.parentJoint] == "theta"
+    )
 
 
 def movable(robot: Robot) -> list[str]:
@@ -66,7 +111,7 @@ def movable(robot: Robot) -> list[str]:
 
 
 def _carried(robot: Robot) -> Iterator[str]:
-    """Links of the platform's body ahead of the axle, not those of its wheels."""
+    """Links of the platform's body."""
     carried = [
         {
             frame.name
@@ -76,7 +121,7 @@ def _carried(robot: Robot) -> Iterator[str]:
         for model in (robot.model, robot.display_model)
     ]
     for name in robot.frames:
-        if all(name in names for names in carried) and _ahead(robot, name) > 0.0:
+        if all(name in names for names in carried):
             yield name
 
 
@@ -109,8 +154,8 @@ def paths(robot: Robot, axes: str, place: Array) -> Iterator[HandsPath]:
 def _circle(place: Array, radius: float, speed: float) -> HandsPath:
     radius, rate = _rounded(radius), _rounded(speed / radius)
     center = [place[0], place[1] + radius, *place[2:]]
-    keys = {"center": _places(center), "radius": radius, "rate": rate, "phase": "-pi/2"}
-    why = "it begins where the end-effector is, straight ahead, and bends to the left"
+    keys = {"center": _places(center), "radius": radius, "rate": rate, "phase": "-pi/2", "run_up": _RUN_UP}
+    why = "it begins at rest where the end-effector is, straight ahead, and bends to the left"
     return HandsPath({"kind": "circle", **keys}, _lasting(2 * math.pi / rate), why)
 
 

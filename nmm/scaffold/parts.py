@@ -55,8 +55,10 @@ def chosen_robot(
         robot, data = _loaded(data, folder)
         return Chosen(robot, data, f"{robot.platform.name}, {_origin(robot)}")
     robot, data = _loaded(_part(source, folder, given), folder)
-    if given.get("platform") or robot.wheels or provenance_of(robot).platform in ("file", "base"):
-        return Chosen(robot, data, f"{robot.platform.name}, {_origin(robot)}")
+    if provenance_of(robot).platform != "default" or not any(
+        note.code == "no_wheels" for note in robot.notes
+    ):
+        return Chosen(robot, data, f"{robot.platform.name}, {_origin(robot)}{_why_kept(robot)}")
     if not robot.q_names[robot.platform.n_p :]:
         what = "has neither wheels nor movable joints: there is nothing to lead"
         raise InputError(what, where=source)
@@ -67,6 +69,11 @@ def chosen_robot(
         "--arm FILE; none: --platform fixed; its root as a unicycle without wheels: --platform unicycle"
     )
     return Chosen(robot, data, why)
+
+
+def _why_kept(robot: Robot) -> str:
+    """What the file has of wheels, where it is not told by them: nothing is put under these."""
+    return "".join(f": {note}" for note in robot.notes if note.code in ("wheels_fixed", "radius_unknown"))
 
 
 def _mounted(base: Mapping[str, Any], arm: Mapping[str, Any], at: str | None) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 from nmm.robots.semantics import POSTURE
 from nmm.scaffold.end_effector import Hand, movable
+from nmm.scaffold.standing import Standing
 from nmm.scenario.short_task import moving_axes
 
 #: A J whose least singular value is below this, per metre of arm, is near a singularity.
@@ -45,10 +46,10 @@ class Start:
     why: str  #: where it comes from
 
 
-def start_for(robot: Robot, hand: Hand) -> Start | None:
+def start_for(robot: Robot, hand: Hand, standing: Standing) -> Start | None:
     """The best start for one end-effector; None where no configuration has a J of full rank."""
     moved = moving_axes({"kind": "position", "frame": hand.frame}, robot)
-    look = _Look(robot, hand)
+    look = _Look(robot, hand, standing)
     seen = [look.at(q) for q in _tried(robot, hand)]
     for axes in ("".join(some) for count in range(len(moved), 0, -1) for some in combinations(moved, count)):
         if len(axes) <= len(look.all):
@@ -75,8 +76,8 @@ class _Seen(NamedTuple):
 class _Look:
     """One end-effector of a robot, evaluated at configurations."""
 
-    def __init__(self, robot: Robot, hand: Hand) -> None:
-        self.robot, self.hand = robot, hand
+    def __init__(self, robot: Robot, hand: Hand, standing: Standing) -> None:
+        self.robot, self.hand, self.standing = robot, hand, standing
         self.all = [robot.input(name) for name in movable(robot)]
         self.arm = [robot.input(name) for name in hand.joints]
 
@@ -132,7 +133,7 @@ def _posture(look: _Look, axes: str) -> Start | None:
             robot.check_limits(q)
         except InputError:
             continue
-        if look.at(q).sigma(axes, look.all) >= REGULAR:
+        if look.at(q).sigma(axes, look.all) >= REGULAR and look.standing.margin(q) > 0.0:
             where = "SRDF" if robot.semantics.files else "file"
             return Start(q, {POSTURE: name}, axes, f"a posture of the robot's {where}")
     return None
@@ -146,7 +147,7 @@ def _searched(look: _Look, seen: list[_Seen], axes: str) -> Start | None:
     if not good:
         return None
     touching = look.touching()
-    q = min(good, key=touching)
+    q = min(good, key=lambda one: (look.standing.margin(one) <= 0.0, touching(one)))
     q = robot.following.placed(np.clip(np.round(q, 2), *robot.q_limits.T))
     if look.at(q).sigma(axes, look.all) < REGULAR:
         return None

@@ -73,7 +73,7 @@ _ABOUT = {
     "objective": "What the motion that is left over is used for. kind: "
     f"{', '.join(OBJECTIVES)} (docs/objectives.md).",
     "resolver": f"How the redundancy is resolved. kind: {', '.join(RESOLVERS)} (docs/resolvers.md).",
-    "limits": "What inputs and joints are kept within: true for what the robot's file says, or a mapping "
+    "limits": "What inputs and joints are kept within: what the robot's file says, and what is here "
     "(docs/limits.md).",
 }
 _MORE = (

@@ -293,7 +293,7 @@ def common_period(controllers: Iterable[Controller], q: Array) -> float:
 
 def _periods(reference: Function, configuration: Configuration) -> list[float]:
     """The periods of what moves in a reference, s; none for what stands still."""
-    if isinstance(reference, Circle):
+    if isinstance(reference, Circle) and not reference.run_up:
         return [2.0 * math.pi / abs(reference.rate)] if reference.rate else []
     if isinstance(reference, PiecewisePolynomial) and reference.repeats:
         return [float(reference.breaks[-1] - reference.breaks[0])]

@@ -18,14 +18,21 @@ from nmm.robots.robot import Robot
 
 @kernel(FUNCTION)
 def circle(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
-    """c + ρ (cos φ e1 + sin φ e2), φ = φ0 + rate t; numbers = [ρ, rate, φ0, i1, i2, c...]."""
+    """c + ρ (cos φ e1 + sin φ e2), φ = φ0 + rate t, later by half the run-up T, within which the rate grows
+    as 3 (t/T)² - 2 (t/T)³; numbers = [ρ, rate, φ0, i1, i2, T, c...]."""
     radius = numbers[0]
     rate = numbers[1]
-    phase = numbers[2] + rate * at.t
+    passed = at.t
+    T = numbers[5]
+    if T > 0.0:
+        share = min(max(at.t / T, 0.0), 1.0)
+        passed = T * share**3 * (1.0 - 0.5 * share) + max(at.t - T, 0.0)
+        rate *= share * share * (3.0 - 2.0 * share)
+    phase = numbers[2] + numbers[1] * passed
     first = int(numbers[3])
     second = int(numbers[4])
     for i in range(rows.value.shape[0]):
-        rows.value[i] = numbers[5 + i]
+        rows.value[i] = numbers[6 + i]
     rows.value[first] += radius * math.cos(phase)
     rows.value[second] += radius * math.sin(phase)
     rows.value_t[first] = -radius * rate * math.sin(phase)
@@ -42,6 +49,7 @@ class Circle(Function):
     rate : angular speed, rad/s; negative runs clockwise
     phase : φ at t = 0, rad
     plane : xy, yz or zx, for a centre in space: the axes along which φ is 0 and π/2
+    run_up : how long it takes from rest at t = 0 to its speed, s; by default it has it at all times
 
     Examples
     --------
@@ -52,7 +60,13 @@ class Circle(Function):
     """
 
     def __init__(
-        self, center: ArrayLike, radius: float, rate: float, phase: float = 0.0, plane: str = "xy"
+        self,
+        center: ArrayLike,
+        radius: float,
+        rate: float,
+        phase: float = 0.0,
+        plane: str = "xy",
+        run_up: float = 0.0,
     ) -> None:
         self.center = vector(center, (2, 3), "center")
         there = plane == "xy" or (plane in ("yz", "zx") and self.center.size == 3)
@@ -61,13 +75,15 @@ class Circle(Function):
         self.rate = scalar(rate, "rate")
         self.phase = scalar(phase, "phase")
         self.plane = plane
+        self.run_up = scalar(run_up, "run_up")
+        expect(self.run_up >= 0.0, "run_up", "a time, s, 0 for none", run_up)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         return tuple(Row(axis, "m") for axis in "xyz"[: self.center.size])
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         first, second = ("xyz".index(axis) for axis in self.plane)
-        numbers = np.array([self.radius, self.rate, self.phase, first, second, *self.center])
+        numbers = np.array([self.radius, self.rate, self.phase, first, second, self.run_up, *self.center])
         return (Stage(circle, self.center.size, (), numbers),)
 
 
@@ -87,8 +103,9 @@ class VelocityOf(Function):
     """
 
     def __init__(self, of: Function) -> None:
-        if not isinstance(of, Circle | PiecewisePolynomial):
-            raise InputError(where="of", expected="a circle, line, polynomial, spline or constant", got=of)
+        if not isinstance(of, Circle | PiecewisePolynomial) or getattr(of, "run_up", 0.0) > 0.0:
+            expected = "a circle without run_up, line, polynomial, spline or constant"
+            raise InputError(where="of", expected=expected, got=of)
         self.of = of
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
@@ -100,7 +117,7 @@ class VelocityOf(Function):
             numbers = stage.numbers.copy()
             numbers[0] *= self.of.rate
             numbers[2] += math.pi / 2
-            numbers[5:] = 0.0
+            numbers[6:] = 0.0
             return (Stage(circle, stage.rows, (), numbers),)
         breaks, c = self.of.breaks, self.of.coefficients
         powers = np.arange(len(c) - 1, 0, -1)[:, None, None]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from nmm.arrays import positive, scalar
 from nmm.errors import InputError, expect
-from nmm.platforms.wheel_layout import HITCHES, Layout, Pivot, RollingJoint
+from nmm.platforms.wheel_layout import HITCHES, Layout, Pivot, RollingJoint, trails
 
 #: Name of the main body: of the coordinate that turns it.
 MAIN = "theta"
@@ -156,6 +156,7 @@ class CasterWheel(WheelDescription):
     Attributes
     ----------
     trail : how far the wheel's centre lies behind the pivot, m, not 0
+    offset : how far it lies to the left of the pivot, m
 
     Examples
     --------
@@ -166,9 +167,11 @@ class CasterWheel(WheelDescription):
     """
 
     trail: float = 0.0
+    offset: float = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        scalar(self.offset, f"wheel {self.name}: offset")
         where = f"wheel {self.name}: trail"
         expect(scalar(self.trail, where) != 0.0, where, "other than 0, or nothing swivels a caster", 0.0)
 
@@ -204,13 +207,11 @@ class OmniWheel(WheelDescription):
 
 
 def parts_from(layout: Layout) -> tuple[list[WheelDescription], list[Hitch]]:
-    """A file's wheels and hitches. Pivots named "hitch" or "trailer" are hitches; wheels on their bodies and
-    on the main one are fixed; on pivots named "steer", steered; behind or before other pivots, casters. A
-    file does not show rollers. `InputError` for no wheels, other pivots, casters or steered wheels on
-    pivots."""
+    """A file's wheels and hitches. Wheels on the bodies of hitches and on the main one are fixed; on pivots
+    that steer, steered, with a trail only where that is not small beside the wheel; behind or before other
+    pivots, casters; right on swivels, none: these constrain nothing. A file does not show rollers.
+    `InputError` for no wheels, other pivots, and wheels right on a pivot that nothing says more of."""
     expected = "wheels, which describe the platform"
-    if not layout.wheels:
-        raise InputError("no wheels found", where=layout.robot, expected=expected)
     pivots = {pivot.joint: pivot for pivot in layout.pivots}
     carriers = {wheel.carrier for wheel in layout.wheels} | {pivot.carrier for pivot in layout.pivots}
     hitches = [
@@ -219,10 +220,17 @@ def parts_from(layout: Layout) -> tuple[list[WheelDescription], list[Hitch]]:
         if pivot.hitches and pivot.joint in carriers
     ]
     bodies = {MAIN, *(hitch.joint for hitch in hitches)}
-    return [_wheel(wheel, pivots, bodies, layout.robot) for wheel in layout.wheels], hitches
+    made = [_wheel(wheel, pivots, bodies, layout.robot) for wheel in layout.wheels]
+    wheels = [wheel for wheel in made if wheel is not None]
+    if not wheels:
+        what = "all wheels swivel freely" if layout.wheels else "no wheels found"
+        raise InputError(what, where=layout.robot, expected=expected)
+    return wheels, hitches
 
 
-def _wheel(wheel: RollingJoint, pivots: dict[str, Pivot], bodies: set[str], robot: str) -> WheelDescription:
+def _wheel(
+    wheel: RollingJoint, pivots: dict[str, Pivot], bodies: set[str], robot: str
+) -> WheelDescription | None:
     if wheel.carrier in bodies:
         return FixedWheel(wheel.joint, wheel.x, wheel.y, wheel.radius, wheel.heading, wheel.carrier)
     where = f"{robot}: wheel {wheel.joint}"
@@ -236,16 +244,17 @@ def _wheel(wheel: RollingJoint, pivots: dict[str, Pivot], bodies: set[str], robo
     place = complex(wheel.x, wheel.y)
     ahead = place * cmath.rect(1.0, -wheel.heading)  # in the wheel's own axes
     at = (wheel.joint, pivot.x, pivot.y, wheel.radius)
+    trail = -ahead.real if trails(wheel) else 0.0
     if pivot.steers:
         return SteeredWheel(
-            *at, wheel.heading, pivot.carrier, pivot.joint, -ahead.real, ahead.imag, pivot.lower, pivot.upper
+            *at, wheel.heading, pivot.carrier, pivot.joint, trail, ahead.imag, pivot.lower, pivot.upper
         )
-    if abs(place) < _ON_AXIS:
+    if not trail and pivot.role:
+        return None
+    if abs(ahead.real) < _ON_AXIS:
         what = f"it is on the axis of {pivot.joint}, so it is no caster"
-        raise InputError(f"{what}; --steer {pivot.joint} (steer=[{pivot.joint!r}]) if it is steered, or lock it", where=where)
-    if abs(ahead.imag) > 1e-3 * abs(place):
-        what = f"it is {ahead.imag:g} m beside the axis of {pivot.joint}"
-        what += f"; --steer {pivot.joint} (steer=[{pivot.joint!r}]) if it is steered"
-        raise InputError(what, where=where, expected="a caster's wheel behind or before its axis")
+        cure = f"--steer {pivot.joint} (steer=[{pivot.joint!r}]) if it is steered, or lock it"
+        raise InputError(f"{what}; {cure}", where=where)
     # A caster that looks backwards at zero has its trail ahead.
-    return CasterWheel(*at, math.remainder(wheel.heading, 2 * math.pi), pivot.carrier, -ahead.real)
+    heading = math.remainder(wheel.heading, 2 * math.pi)
+    return CasterWheel(*at, heading, pivot.carrier, -ahead.real, ahead.imag)

@@ -273,4 +273,5 @@ def _caster(bodies: Bodies, wheel: CasterWheel, qp: Array, qp_dot: Array, angle:
     sideways = Term(pivot.body, pivot.point, pivot.direction + math.pi / 2)
     along, across = (float(bodies.row([term], qp) @ qp_dot) for term in (pivot, sideways))
     carrier = sum(float(qp_dot[2 + body]) for body in bodies.chain(pivot.body))
-    return WheelRate(along / wheel.radius, across / wheel.trail - carrier)
+    turn = across / wheel.trail  # of the fork over the ground: the wheel beside its pivot rolls by it, too
+    return WheelRate((along - turn * wheel.offset) / wheel.radius, turn - carrier)

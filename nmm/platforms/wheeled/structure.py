@@ -173,7 +173,8 @@ class Structure:
                 elif self._takes_a_motion(constraint.row, samples):
                     self.constraints.append(constraint)
                     pending.remove(wheel)
-        self.followed += [self._follow(wheel) for wheel in pending]
+        # Of wheels on one pivot, whose axes are one, the last.
+        self.followed += [self._follow(wheel) for wheel in {wheel.joint: wheel for wheel in pending}.values()]
         for wheel in steered:
             # The motion turns a wheel with a trail, unless its rate was asked for as an input.
             if not wheel.centered and not self._repeats(constraint := self._no_slip(wheel)):
