@@ -59,9 +59,10 @@ def drawn_within(
     """Where configurations are drawn, (n,) each: joints within limits, the platform around all that is
     known."""
     low, high = np.where(robot.limited, robot.q_limits, [-np.pi, np.pi]).T.copy()
-    turns = robot.continuous
-    low = np.where(turns, start - np.pi, np.maximum(low, start - np.pi))
-    high = np.where(turns, start + np.pi, np.minimum(high, start + np.pi))
+    # What goes round and starts far from 0 is drawn all round.
+    far_round = robot.continuous & (np.abs(start) > 0.5 * np.pi)
+    low = np.where(far_round, start - np.pi, np.maximum(low, start - np.pi))
+    high = np.where(far_round, start + np.pi, np.minimum(high, start + np.pi))
     if robot.platform.n_p >= 3:
         points = [start[:2]]
         for obstacle in obstacles:
