@@ -82,8 +82,8 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
         "wheels_slid",
         {"speeds": {"left_wheel": 0.2, "right_wheel": 0.1}},
         {"t": 1.5},
-        "wheels of the robot's file slid sideways, most at t = 1.5 s: left_wheel (up to 0.2 m/s), right_wheel "
-        "(up to 0.1 m/s); is its platform what its wheels allow? (nmm check)",
+        "wheels of the robot's file slid sideways, most at t = 1.5 s: left_wheel (up to 0.2 m/s), "
+        "right_wheel (up to 0.1 m/s); is its platform what its wheels allow? (nmm check)",
     ),
     (
         "collided",

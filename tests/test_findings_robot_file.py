@@ -378,8 +378,8 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     "wheels_fixed": (
         {"names": ["left_wheel"]},
         {},
-        "links that are called wheels do not turn in the file (left_wheel): its root is taken for a unicycle, "
-        "--platform for another",
+        "links that are called wheels do not turn in the file (left_wheel): its root is taken for a "
+        "unicycle, --platform for another",
     ),
     "no_wheels": (
         {},

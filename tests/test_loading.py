@@ -554,7 +554,8 @@ def test_radius_from_the_shape(height: float, tmp_path: Path) -> None:
     path = as_file(tmp_path, wheeled(origin=origin, solid=shape('<box size="1 1 1"/>')))
     blind = load(path)  # as a unicycle, which needs none
     assert_found(of_code(blind.notes, "radius_unknown"), ("radius_unknown", {"names": ["w_joint"]}))
-    assert blind.wheels == () and "w_joint" not in blind.q_names
+    assert blind.wheels == ()
+    assert "w_joint" not in blind.q_names
     assert load(path, wheels={"w_joint": 0.2}).wheels[0].radius == 0.2
 
 

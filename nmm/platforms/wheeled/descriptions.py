@@ -242,7 +242,10 @@ def _wheel(wheel: RollingJoint, pivots: dict[str, Pivot], bodies: set[str], robo
         )
     if abs(place) < _ON_AXIS:
         what = f"it is on the axis of {pivot.joint}, so it is no caster"
-        raise InputError(f"{what}; --steer {pivot.joint} (steer=[{pivot.joint!r}]) if it is steered, or lock it", where=where)
+        raise InputError(
+            f"{what}; --steer {pivot.joint} (steer=[{pivot.joint!r}]) if it is steered, or lock it",
+            where=where,
+        )
     if abs(ahead.imag) > 1e-3 * abs(place):
         what = f"it is {ahead.imag:g} m beside the axis of {pivot.joint}"
         what += f"; --steer {pivot.joint} (steer=[{pivot.joint!r}]) if it is steered"

@@ -358,8 +358,8 @@ def _with_held_wheels(made: Locked, asked: Asked, source: Source) -> Locked:
 def _with_idle_parts_held(
     made: Locked, layout: Layout, own: Sequence[str], source: Source
 ) -> tuple[Locked, list[Finding]]:
-    """The model in which what steers, without a wheel's joint and not as the platform's own, stands still, and
-    so do wheels whose size nothing tells."""
+    """The model in which what steers, without a wheel's joint and not as the platform's own, stands still; so
+    do wheels whose size nothing tells."""
     carrying = {wheel.carrier for wheel in layout.wheels}
     follows = {one.joint for one in made.mimic_joints}
     idle = [
