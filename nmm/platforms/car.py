@@ -97,9 +97,8 @@ class _Bicycle(Platform):
     def fit(cls, layout: Layout) -> Self:
         """Wheelbase and steering joint of the file; the joint's limits when they are symmetric.
 
-        The steering joint is upright, on the root's body, on the x axis ahead of the reference point, with
-        "steer" in its name; or two such joints with wheels, equally far beside the x axis, count as one
-        midway, `steer`. `InputError` for none, several, or rear wheels that are not at the reference
+        The steering joint is upright, on the root's body, on the x axis ahead of the reference point; or two
+        such joints, equally far beside the x axis, count as one midway, `steer`. `InputError` for none, several, or rear wheels that are not at the reference
         point."""
         named = [pivot for pivot in steering_pivots(layout) if abs(pivot.y) <= NEAR < pivot.x]
         pair = steered_pair(layout)
@@ -107,8 +106,8 @@ class _Bicycle(Platform):
             named = [pivot for pivot in named if abs(pivot.x - pair.x) <= NEAR]
             pair = None if named else pair
         if len(named) != 1 and pair is None:
-            expected = 'one steering joint: upright, "steer" in its name, on the x axis of the root, x > 0'
-            expected += "; or two with wheels, equally far beside it"
+            expected = "one steering joint (--steer NAME): upright, on the x axis of the root, x > 0"
+            expected += "; or two, equally far beside it"
             wrong = f"there are {len(named)}" if named else "there is none"
             raise misfit(layout, cls.name, expected, wrong, layout.pivots)
         check_axle(layout, cls.name)
