@@ -98,8 +98,8 @@ class _Bicycle(Platform):
         """Wheelbase and steering joint of the file; the joint's limits when they are symmetric.
 
         The steering joint is upright, on the root's body, on the x axis ahead of the reference point; or two
-        such joints, equally far beside the x axis, count as one midway, `steer`. `InputError` for none, several, or rear wheels that are not at the reference
-        point."""
+        such joints, equally far beside the x axis, count as one midway, `steer`. `InputError` for none,
+        several, or rear wheels that are not at the reference point."""
         named = [pivot for pivot in steering_pivots(layout) if abs(pivot.y) <= NEAR < pivot.x]
         pair = steered_pair(layout)
         if pair is not None:  # a joint on the axis speaks for the wheels only where it is midway between them
