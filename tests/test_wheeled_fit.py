@@ -119,7 +119,7 @@ def slip(platform: WheeledPlatform, wheels: Any, rates: dict[str, tuple[complex,
     rng = np.random.default_rng(2)
     worst = 0.0
     for _ in range(20):
-        theta, angles = rng.uniform(-1, 1), {name: 0.0 for name in platform.coordinates[3:]}
+        theta, angles = rng.uniform(-1, 1), dict.fromkeys(platform.coordinates[3:], 0.0)
         center = complex(*rng.uniform(-2, 2, 2))  # of rotation: all axes pass it where wheels are centred
         for name in angles:
             at = rates[name][0] - center
