@@ -271,7 +271,7 @@ def nmm_rates(run: nmm.Trajectory, case: Case) -> dict[str, np.ndarray]:
 
 def mujoco_rates(run: nmm.Trajectory, wheels: Mapping[str, Wheel]) -> dict[str, np.ndarray]:
     """Rates at which the lowest points of MuJoCo's wheels have no velocity along the ground ahead."""
-    import mujoco
+    import mujoco  # type: ignore[import-untyped]
 
     bodies = "".join(
         f'<body name="{name}" pos="{one.place[0]} {one.place[1]} {one.radius}">'
