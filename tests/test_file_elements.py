@@ -211,7 +211,7 @@ def test_a_first_scenario_keeps_the_files_accelerations(tmp_path: Path) -> None:
     )  # fmt: skip
     file = write(tmp_path / "r.urdf", text)
     made = first_scenario(file, file=tmp_path / "s.yaml", platform="unicycle")
-    assert made.scenario.resolved()["limits"]["acceleration"] == {"j": 3.0}
+    assert made.scenario.resolved()["limits"]["acceleration"]["j"] == 3.0
     run = made.trajectory
     change = np.diff(run.u[:, run.robot.input("j")]) / np.diff(run.t)
     assert np.abs(change).max() <= 3.0 + 1e-6

@@ -333,3 +333,67 @@ def test_a_link_and_a_joint_of_one_name_in_a_robot_without_an_arm(tmp_path: Path
     draft = nmm.first_scenario(write(tmp_path / "r.urdf", robot(*parts)), file=tmp_path / "r.yaml")
     assert draft.trajectory.complete
     assert "frame: hip, " in draft.chosen[1]
+
+
+CYLINDER = shape('<cylinder radius="0.1" length="0.05"/>')
+
+
+def wheeled_file(path: Path, places: dict[str, str], kind: str = "continuous") -> Path:
+    parts = [
+        link("base"),
+        link("front"),
+        joint("nose", "base", "front", "fixed", "", '<origin xyz="0.4 0 0"/>'),
+    ]
+    for name, place in places.items():
+        origin = f'<origin xyz="{place} 0.1" rpy="-1.5707963 0 0"/>'
+        parts += [link(f"{name}_link", CYLINDER)]
+        parts += [joint(name, "base", f"{name}_link", kind, '<axis xyz="0 0 1"/>', origin)]
+    return write(path, robot(*parts))
+
+
+def test_no_other_base_is_put_under_wheels_that_do_not_turn(run: Command, tmp_path: Path) -> None:
+    file = wheeled_file(tmp_path / "stiff.urdf", {"left_wheel": "0 0.2", "right_wheel": "0 -0.2"}, "fixed")
+    made = run("init", str(file), "--out", "first.yaml")
+    assert (made.status, made.err) == (0, "")
+    assert "links that are called wheels do not turn" in made.out
+    assert "differential_base" not in Path("first.yaml").read_text(encoding="utf-8")
+    assert yaml.safe_load(Path("first.yaml").read_text(encoding="utf-8"))["task"]["frame"] == "front"
+
+
+def test_it_leads_the_base_not_a_wheel(tmp_path: Path) -> None:
+    """With platform unicycle its wheels' links are on the base, and one is farther ahead than its front."""
+    file = wheeled_file(
+        tmp_path / "r.urdf", {"left_wheel": "0 0.2", "right_wheel": "0 -0.2", "wheel": "0.6 0"}, "fixed"
+    )
+    assert [hand.frame for hand in hands(nmm.load(file))] == ["front"]
+
+
+def test_wheels_that_leave_the_platform_open_are_refused_alike(run: Command, tmp_path: Path) -> None:
+    file = wheeled_file(
+        tmp_path / "r.urdf", {"wheel_a": "0.3 0.2", "wheel_b": "-0.3 0.1", "wheel_c": "0 -0.3"}
+    )
+    scenario = {"robot": str(file), "duration": 1, "dt": 0.1, "resolver": {"kind": "pg"}, "q0": {}}
+    scenario["task"] = {"kind": "position", "frame": "base", "axes": "xy", "reference": [1, 0]}
+    Path("s.yaml").write_text(yaml.safe_dump(scenario), encoding="utf-8")
+    said = "the wheels do not tell the platform: --platform omnidirectional or --platform unicycle?"
+    for arguments in (("check", str(file)), ("info", str(file)), ("init", str(file)), ("run", "s.yaml")):
+        made = run(*arguments)
+        assert made.status == 2
+        assert said in " ".join((made.out + made.err).split()), arguments
+
+
+@pytest.mark.parametrize("run_up", [0.0, 2.0])
+def test_a_circle_from_rest(run_up: float) -> None:
+    """Its rate is its value's derivative, it rests before t = 0, and is late by half the run-up after it."""
+    robot = nmm.load("unicycle_2r")
+    circle = nmm.Circle([1.0, 2.0], 0.5, rate=0.7, phase=0.2, run_up=run_up)
+    here = nmm.Configuration(robot, robot.rest)
+    times = np.array([-1.0, 0.0, 0.3, 1.0, 1.999, 2.5, 7.0])
+    for t in times[(times > 0.0) | (run_up == 0.0)]:
+        later, earlier = (nmm.evaluate(circle, t + d, here).value for d in (1e-6, -1e-6))
+        np.testing.assert_allclose(nmm.evaluate(circle, t, here).value_t, (later - earlier) / 2e-6, atol=1e-8)
+    angle = 0.2 + 0.7 * (7.0 - 0.5 * run_up)
+    expected = [1.0 + 0.5 * np.cos(angle), 2.0 + 0.5 * np.sin(angle)]
+    np.testing.assert_allclose(nmm.evaluate(circle, 7.0, here).value, expected, atol=1e-12)
+    if run_up:
+        np.testing.assert_array_equal(nmm.evaluate(circle, 0.0, here).value_t, 0.0)

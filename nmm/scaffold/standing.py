@@ -40,9 +40,9 @@ class Standing:
         return self._moved(q)[0]
 
     def accelerations(self, q: Array, share: float = 1.0) -> dict[str, float]:
-        """Largest accelerations by input, m/s² and rad/s²: the file's or usual ones, or at q half of
-        what tips the robot, each alone; times a share of 1 or less. "arm" is of all joints, slides by their
-        own names aside."""
+        """Largest accelerations by input, m/s² and rad/s²: the file's or usual ones, or at q half of what
+        tips the robot, each alone; times a share of 1 or less. "arm" is of all joints, slides by their own
+        names aside."""
         margin, shifts = self._moved(q)
         robot, p, of_file = self.robot, self.robot.platform.p, accelerations_of(self.robot)
         usual = np.array([*self._of_platform(q), *self._of_joints()])

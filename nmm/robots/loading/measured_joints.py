@@ -146,7 +146,9 @@ class Measured:
             return True
         endless = not np.isfinite(_ends(self.model, joint)).any()
         on_base = int(self.model.parents[joint]) == self.root
-        return rolls and endless and on_base and _CORNERS.search(names) is not None
+        if not (rolls and endless and _CORNERS.search(names)):
+            return False
+        return on_base or any(tyre.is_round for tyre in self.tyres(joint))
 
     def carries_wheel_link(self, joint: int) -> bool:
         """Whether a link that is called a wheel is fixed to the joint's body."""
