@@ -24,7 +24,8 @@ from nmm.playback.keyframes import LARGEST_TURN, ghost_samples, keyframes
 from nmm.playback.placements import Placements, rolling_joints
 from nmm.playback.rolling import Rolling, caster_step
 from nmm.robots.loading import load
-from nmm.robots.loading.measured_joints import Measured, measure_layout
+from nmm.robots.loading.measured_joints import Measured
+from nmm.robots.loading.measured_layout import measure_layout
 from nmm.robots.robot import Robot
 from nmm.robots.wheel import Wheel
 

@@ -1,9 +1,9 @@
-"""Measures a model's wheels and upright joints: where tyres stand, how long a platform is."""
+"""A model's joints as a base has them: which may be wheels, columns, what is between; sizes of wheels."""
 
 import math
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -13,32 +13,22 @@ from nmm.arrays import Array, positive
 from nmm.errors import InputError, RobotError, expect_known
 from nmm.findings import Finding
 from nmm.findings.robot_file import refusal
-from nmm.platforms import Platform
-from nmm.platforms.recognition import with_roles
 from nmm.platforms.wheel_layout import (
-    HITCHES,
-    NEAR,
     PARALLEL,
-    STEERING,
-    SWIVELS,
-    Layout,
-    Pivot,
     Rollers,
-    RollingJoint,
     is_named,
 )
 from nmm.robots.loading.chain import replaced_joints
 from nmm.robots.loading.drive_marks import DriveMarks, rollers_named
 from nmm.robots.loading.joint_kinds import axis, is_revolute, joint_limits
 from nmm.robots.loading.tyres import Tyre, tyres
-from nmm.robots.wheel import Wheel
 
 # How far from upright a steering column may lean, rad.
 _LEAN = 0.2
 # A centre so near the root link's xy plane lies in it: the plane is then not the ground.
 _ON_PLANE = 1e-6
 _SHORT_NAMES = re.compile("caster|castor|(?<![a-z])[lr]w(?![a-z])")
-#: Of joints on the base that turn without end alone: a walking robot's legs are called so, too.
+#: Of joints that turn without end alone: a walking robot's legs are called so, too.
 _CORNERS = re.compile("(?<![a-z])(?:[fbr][lr]|[lr][fbr])(?![a-z])")
 #: Parts of the names of links that are wheels.
 _WHEELS = ("wheel", "tire", "tyre")
@@ -46,8 +36,6 @@ _WHEELS = ("wheel", "tire", "tyre")
 Asked = Sequence[str] | Mapping[str, float] | None
 #: Why a joint is no wheel's: `why`, a code, and the names in its words; None for a wheel's.
 NoWheel = Mapping[str, str] | None
-#: A wheel that ends so much above the ground, as a share of its radius, guides a track, or nothing.
-_ALOFT = 0.5
 #: The share of a radius by which files round it, and tyres give way.
 ROUNDED = 0.01
 
@@ -144,7 +132,7 @@ class Measured:
         rolls = self.why_not_rolling(joint) is None
         if is_named(names, _WHEELS) or (rolls and _SHORT_NAMES.search(names)):
             return True
-        endless = not np.isfinite(_ends(self.model, joint)).any()
+        endless = not np.isfinite(ends_of(self.model, joint)).any()
         on_base = int(self.model.parents[joint]) == self.root
         if not (rolls and endless and _CORNERS.search(names)):
             return False
@@ -286,169 +274,12 @@ def expect_names(asked: Asked, where: str) -> None:
         raise RobotError(where=f"{where}: wheels", expected="a list of joint names", got=asked)
 
 
-def measure_layout(measured: Measured, asked: Asked, steer: Collection[str] = ()) -> Layout:
-    """The wheels and the upright joints that steer, hitch or swivel, for `Platform.fit`.
-
-    Lengths are along the root link's axes with every joint at zero. An upright joint counts if it carries a
-    wheel, is in `steer`, or its name says what it is ("steer", "hitch", "trailer", "caster", "swivel"); one
-    that ends on both sides counts if it carries a link called a wheel, too. Of one whose axis points down,
-    the limits are those of the angle to the left. `RobotError` as in `find_wheels`, for an unknown name in
-    `steer`, and for one that is no upright joint."""
-    model = measured.model
-
-    def why_not(name: str) -> NoWheel:
-        joint = measured.joints[name]
-        upright = all(measured.is_upright(above) for above in measured.above(joint))
-        return measured.why_not_rolling(joint) or (None if upright else {"why": "not_on_root"})
-
-    for name in steer:
-        expect_known("joint that steers", name, measured.joints, measured.where, RobotError)
-        if not measured.is_upright(measured.joints[name]):
-            expected = "a joint that turns about an upright axis"
-            raise RobotError(where=f"{measured.where}: steer", expected=expected, got=name)
-    given, _ = measured.wheels(asked, why_not=why_not)
-    radii = {joint: given[name] for name, joint in measured.joints.items() if name in given}
-    carrying = {joint for wheel in radii for joint in measured.above(wheel)}
-
-    def counts(name: str, joint: int) -> bool:
-        if joint in carrying or name in steer or is_named(name, (*STEERING, *HITCHES, *SWIVELS)):
-            return True
-        return bool(np.isfinite(_ends(model, joint)).all()) and measured.carries_wheel_link(joint)
-
-    pivots = [
-        joint for name, joint in measured.joints.items() if measured.is_upright(joint) and counts(name, joint)
-    ]
-    ground = _ground(measured, radii)
-    layout = Layout(
-        str(model.name),
-        tuple(_pivot(measured, joint) for joint in pivots),
-        tuple(_rolling(measured, joint, radii[joint], ground) for joint in radii),
-        measured.marks.drive,
-    )
-    return with_roles(layout, steer)
-
-
-def _ends(model: pin.Model, joint: int) -> tuple[float, float]:
+def ends_of(model: pin.Model, joint: int) -> tuple[float, float]:
     lower, upper = (float(end[0]) for end in joint_limits(model, joint)[4:6])
     return lower, upper
-
-
-def _pivot(measured: Measured, joint: int) -> Pivot:
-    model, place = measured.model, _carried(measured, joint, measured.placements[joint].translation)
-    lower, upper = _ends(model, joint)
-    if measured.points_down(joint):
-        lower, upper = -upper, -lower
-    return Pivot(str(model.names[joint]), *place, lower, upper, speed_limit(model, joint))
-
-
-def _ground(measured: Measured, radii: Mapping[int, float | None]) -> float:
-    """Where the lowest wheel that is no caster ends, m; infinite where no size is known."""
-    bottoms = [
-        float(measured.placements[joint].translation[2]) - measured.radius(joint, radius)
-        for joint, radius in radii.items()
-        if not is_named(str(measured.model.names[joint]), SWIVELS)
-    ]
-    return min((bottom for bottom in bottoms if not math.isnan(bottom)), default=math.inf)
-
-
-def _rolling(measured: Measured, joint: int, radius: float | None, ground: float) -> RollingJoint:
-    turning = measured.axis(joint)
-    # It rolls along axis x z; adding zero makes -0.0 a plain one.
-    heading = math.atan2(-turning[0], turning[1]) + 0.0
-    place = _carried(measured, joint, measured.contact(joint))
-    size = measured.radius(joint, radius)
-    bottom = float(measured.placements[joint].translation[2]) - size
-    touches = not bottom - ground > _ALOFT * size
-    name = str(measured.model.names[joint])
-    return RollingJoint(name, *place, heading, size, measured.rollers(joint), touches)
-
-
-def _carried(measured: Measured, joint: int, place: Array) -> tuple[str, float, float]:
-    """The joint that carries this one ("theta" on the root's body), and where `place` is on it, m."""
-    carrier = int(measured.model.parents[joint])
-    offset = place - measured.placements[carrier].translation
-    name = str(measured.model.names[carrier]) if carrier > measured.root else "theta"
-    return name, float(offset[0]), float(offset[1])
 
 
 def speed_limit(model: pin.Model, joint: int) -> float:
     """Rate limit of a joint, rad/s or m/s; infinite where its file gives none, or 0."""
     own = float(joint_limits(model, joint)[3][0])
     return own if own > 0.0 else math.inf
-
-
-def find_wheels(
-    measured: Measured, asked: Asked, own: Sequence[str], platform: Platform, sliding: Collection[str] = ()
-) -> tuple[tuple[Wheel, ...], list[Finding]]:
-    """The robot's passive wheels, those in `sliding` as such, and notes on joints that are only named wheels.
-
-    A wheel is a revolute joint with a level axis and no joint below it, on the root link's body, one of the
-    platform's own joints or a swivel: an upright joint, not the platform's own, that hangs on one of these
-    and carries only wheels. Without `asked`, the joint's or child link's name must hold "wheel" (or "tire",
-    "caster", lw, rw), or its shape be one. `RobotError` for no joint, or no wheel."""
-    radii, notes = measured.wheels(asked, own)
-    wheels = tuple(
-        replace(_wheel(measured, name, radii[name], own, platform), slides=name in sliding) for name in radii
-    )
-    swivels = {wheel.swivel for wheel in wheels}  # named as wheels, and left out of q as these are
-    return wheels, [note for note in notes if note.values.get("name") not in swivels]
-
-
-def differing_radii(measured: Measured, asked: Asked) -> Iterator[Finding]:
-    """Where a wheel's given radius, m, is not that of any of its shapes (1 mm or 1 % may differ)."""
-    for name, given in asked.items() if isinstance(asked, Mapping) else ():
-        radii = [] if given is None else [tyre.radius for tyre in measured.tyres(measured.joints[name])]
-        if radii and all(abs(given - one) > max(1e-3, ROUNDED * one) for one in radii):
-            yield Finding("wheel_radius_differs", {"name": name, "given": float(given), "measured": radii[0]})
-
-
-def differing_tyres(measured: Measured, names: Iterable[str]) -> Iterator[Finding]:
-    """Where a wheel's shapes do not agree on where the middle of its tyre is, m along its axis."""
-    for name in names:
-        middles = [tyre.middle for tyre in measured.tyres(measured.joints[name])]
-        if middles and max(middles) - min(middles) > NEAR:
-            yield Finding("tyre_unclear", {"name": name, "middles": middles})
-
-
-def without_radius(measured: Measured, layout: Layout) -> tuple[str, ...]:
-    """Wheels of which nothing tells the radius, and the swivels that carry these alone."""
-    names = {wheel.joint for wheel in layout.wheels if math.isnan(wheel.radius)}
-    swivels = {swivel for name in names if (swivel := measured.swivel(name, ()))}
-    others = {wheel.carrier for wheel in layout.wheels if wheel.joint not in names}
-    return (*sorted(swivels - others), *sorted(names))
-
-
-def held_joints(measured: Measured, asked: Asked) -> tuple[tuple[str, ...], list[Finding]]:
-    """A fixed base's wheels (as `find_wheels` takes them, radii aside), after their swivels, and notes."""
-    names, notes = measured.wheels(asked)
-    held = [joint for name in names for joint in (measured.swivel(name, ()), name) if joint]
-    return tuple(dict.fromkeys(held)), notes
-
-
-def _wheel(
-    measured: Measured, name: str, radius: float | None, own: Sequence[str], platform: Platform
-) -> Wheel:
-    model, joint = measured.model, measured.joints[name]
-    carrier, swivel = int(model.parents[joint]), measured.swivel(name, own)
-    if swivel:
-        carrier = int(model.parents[carrier])
-    carried = measured.placements[carrier].inverse()
-    center = carried.act(measured.contact(joint))
-    pivot, roller, rolls_at = np.zeros(3), 0.0, center.copy()
-    if swivel:
-        pivot = carried.act(measured.placements[measured.joints[swivel]].translation)
-    if carrier == measured.root and not swivel:
-        x, y = (float(value) for value in center[:2])
-        roller, rolls_at[:2] = platform.roller(x, y), platform.rolls_at(x, y)
-    return Wheel(
-        name,
-        center,
-        carried.rotation @ measured.axis(joint),
-        measured.radius(joint, radius),
-        rolls_at,
-        carrier=str(model.names[carrier]),
-        swivel=swivel,
-        pivot=pivot,
-        roller=roller,
-        velocity=speed_limit(model, joint),
-    )

@@ -16,17 +16,8 @@ from nmm.platforms.wheel_layout import MAIN_BODY, standing_wheels, wheels_on
 from nmm.robots.loading.chain import CHAIN, Rebuilt, rebuild
 from nmm.robots.loading.ground import slip_warnings
 from nmm.robots.loading.locking import Locked, add_pairs, among_coordinates, at_zero, limit_notes, with_locked
-from nmm.robots.loading.measured_joints import (
-    Asked,
-    Measured,
-    differing_radii,
-    differing_tyres,
-    find_wheels,
-    held_joints,
-    measure_layout,
-    speed_limit,
-    without_radius,
-)
+from nmm.robots.loading.measured_joints import Asked, Measured, speed_limit
+from nmm.robots.loading.measured_layout import measure_layout
 from nmm.robots.loading.names_apart import (
     Names,
     apart,
@@ -36,6 +27,13 @@ from nmm.robots.loading.names_apart import (
     of_file,
     renamed,
     with_names,
+)
+from nmm.robots.loading.passive_wheels import (
+    differing_radii,
+    differing_tyres,
+    find_wheels,
+    held_joints,
+    without_radius,
 )
 from nmm.robots.loading.provenance import Parts, acceleration_notes
 from nmm.robots.loading.source import Source
