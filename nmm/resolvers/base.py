@@ -229,10 +229,9 @@ class Resolver(ABC):
         if rows > dimensions.m and not self.more_rows:
             which = "task" if rows == dimensions.s else "task: first level"
             raise InputError(
-                f"more rows than the {dimensions.m} inputs",
                 where=which,
-                expected="priorities (position 1, orientation 2, say) with resolver pg or dls, or dls alone, "
-                "which does all at once in the least-squares sense",
+                expected=f"at most {dimensions.m} rows, as many as inputs; or priorities (position 1, "
+                "orientation 2, say) with resolver pg or dls; or dls alone, all in the least-squares sense",
                 got=rows,
             )
 

@@ -23,7 +23,7 @@ ALPHA, DAMPING, THRESHOLD, LASTING, C = 0, 1, 2, 3, 4
 LAW = 0
 
 #: The time for which λ is raised grows by this share of how long the robot runs on, and falls as fast.
-GROWS = 0.2
+GROWS = 0.05
 
 Damping = Literal["constant", "variable", "directions"]
 
