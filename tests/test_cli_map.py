@@ -146,7 +146,7 @@ LINES: list[tuple[list[str], str]] = [
     (["unicycle_2r", "--samples", "1"], "samples: expected a whole number from 2, got 1"),
     (
         ["unicycle_2r", "--task", "heading:link2", "--platform", "fixed"],
-        "at most 2 rows, as many as inputs (q1, q2), got 3",
+        "at most 2 rows, as many as inputs",
     ),
     (["unicycle_2r", "--out", "mine"], "is not what this writes"),
     (["unicycle_2r", "--workspace", "xw"], "plane: expected two of x, y, z"),

@@ -397,7 +397,7 @@ REFUSED: list[tuple[Callable[[Path], object], str]] = [
     (made(lambda: nmm.PotentialEnergy([0, 0, 0])), "gravity: expected a vector that is not zero"),
     (made(lambda: nmm.Circle([0, 0], 1, 1) * nmm.PotentialEnergy()), "weight: expected a function of one"),
     (made(lambda: Sum((1.0, nmm.Position("ee")))), "expected terms of one row"),
-    (lambda _: nmm.VelocityOf(nmm.Position("ee")), "of: expected a circle, line, "),
+    (lambda _: nmm.VelocityOf(nmm.Position("ee")), "of: expected a circle without run_up, line, "),
     (posed("{kind: posture, posture: {q1: [1, 2]}}"), "target of q1: expected one row"),
     (posed("{kind: posture, posture: {q1: fast}}"), "posture.q1.*expected a number"),
     (posed("{kind: potential_energy, weight: -1}"), "objective.weight: expected a number above 0"),

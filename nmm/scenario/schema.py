@@ -224,7 +224,8 @@ class ScenarioPart(Part):
                 Sequence(Stack.of(task), robot)
             levels = Stack.of(task).levels(robot)
             s, first = sum(levels), levels[0]
-            if first > robot.n_u and not sequenced:
+            takes_more = (type(own) if own else RESOLVERS.named(self.resolver.kind)).more_rows
+            if first > robot.n_u and not sequenced and not takes_more:
                 of = "" if len(levels) == 1 else " in the first level of priority"
                 expected = f"at most {robot.n_u} rows{of}, as many as inputs ({few(robot.u_names)})"
                 raise InputError(expected=expected, got=first)
