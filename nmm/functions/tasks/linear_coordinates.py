@@ -98,7 +98,8 @@ class Posture(Function):
     >>> here = nmm.Configuration(robot, robot.q({"q1": 0.2, "q2": 0.4}))
     >>> nmm.evaluate(nmm.Posture("q1", "q2"), 0.0, here).value
     array([0.2, 0.4])
-    >>> [[row.angular for row in one.rows(robot)] for one in (nmm.Posture("q1"), nmm.Posture("q1", turns=True))]
+    >>> both = nmm.Posture("q1"), nmm.Posture("q1", turns=True)
+    >>> [[row.angular for row in one.rows(robot)] for one in both]
     [[True], [False]]
     """
 
