@@ -310,9 +310,11 @@ def test_what_urdf_has_no_words_for_is_told(tmp_path: Path) -> None:
 
 def test_the_ground_of_a_file_is_still(tmp_path: Path) -> None:
     """The link below a free joint is where the world is, which the robot's base leaves."""
-    text = """<mujoco><worldbody><body name="box" pos="0 0 0.1"><freejoint/><geom type="box" size="1 1 0.1"/>
-    <body name="arm"><joint name="q1" axis="0 0 1"/><geom size="0.1"/></body></body></worldbody></mujoco>"""
-    made = nmm.load(write(tmp_path / "box.xml", text), platform="omnidirectional")
+    text = """<robot name="box"><link name="world"/><link name="box"/><link name="arm"/>
+    <joint name="root" type="floating"><parent link="world"/><child link="box"/></joint>
+    <joint name="q1" type="continuous"><parent link="box"/><child link="arm"/><origin xyz="0 0 0.1"/>
+    <axis xyz="0 0 1"/></joint></robot>"""
+    made = nmm.load(write(tmp_path / "box.urdf", text), platform="omnidirectional")
     told = messages(run_of(made).save_mcap(tmp_path / "run.mcap"))
     ground = [frame.name for frame in made.model.frames if frame.type == pin.BODY and frame.parentJoint == 0]
     assert ground == ["world"]
