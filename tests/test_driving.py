@@ -648,7 +648,6 @@ def test_bad_input_is_a_line(capfd: pytest.CaptureFixture[str]) -> None:
     for arguments, words in (
         (["nothing_like_it"], "unknown robot or scenario"),
         (["unicycle_3r_sequence"], "tasks that come and go"),
-        (["unicycle_2r", "--task", "pose"], "at most 4"),
         (["unicycle_2r", "--task", "position:nowhere"], "nowhere"),
         (["unicycle_3r_position", "--port", "99999"], "from 1 to 65535"),
     ):
