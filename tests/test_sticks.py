@@ -209,7 +209,8 @@ def test_the_base_lies_between_its_wheels(
         parts.append(link(f"wheel_{i}"))
         place = f'<origin xyz="{x} {y} 0.1"/>'
         parts.append(joint(f"wheel_{i}_joint", "base", f"wheel_{i}", "continuous", SPIN, place))
-    cart = nmm.load(write(tmp_path / "cart.urdf", robot(*parts)))
+    made = write(tmp_path / "cart.urdf", robot(*parts))
+    cart = nmm.load(made, platform=nmm.Unicycle())  # about the root link, wherever its wheels are
     (base,) = [shape for shape in appearance(cart).shapes.geometryObjects if shape.name == "base"]
     np.testing.assert_allclose(base.placement.translation, [*middle, 0.1], atol=1e-12)
     base.geometry.computeLocalAABB()
