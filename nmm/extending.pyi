@@ -172,6 +172,7 @@ from .robots.wheel import Wheel as Wheel
 from .robots.wheel_rates import inputs_held_by as inputs_held_by
 from .robots.wheel_rates import turning_wheels as turning_wheels
 from .robots.wheel_rates import wheel_rates as wheel_rates
+from .robots.wheel_slip import sideways_speeds as sideways_speeds
 from .rollouts.rollout import Rollouts as Rollouts
 from .runs.clearance import ROUNDING as ROUNDING
 from .runs.clearance import Swept as Swept

@@ -179,13 +179,13 @@ def test_what_steers_is_no_wheel_in_the_notes(known: Path) -> None:
 
 def test_an_axle_that_is_neither_point_nor_frame(known: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert status_of(["info", str(known), "--axle", "1;2"]) == 2
-    expected = "--axle: expected a frame, or X,Y[,Z] in m with commas between, got '1;2'"
+    expected = "--axle: expected a frame, or X,Y[,Z[,YAW]] in m and rad with commas between, got '1;2'"
     assert expected in capsys.readouterr().err
 
 
 def test_check_takes_the_axle_that_it_advises(known: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """As info takes it; in brackets, as the advice writes it, too."""
-    for given in ("0.1,0", "(0.1, 0)"):
+    for given in ("0,0", "(0, 0)"):
         assert status_of(["check", str(known), "--axle", given]) == 0
         assert status_of(["info", str(known), "--axle", given]) == 0
     assert status_of(["check", str(known), "--axle", "nowhere"]) == 2

@@ -10,7 +10,6 @@ from nmm.control.directions import WORLD_PARTS, in_world_axes, lost_directions, 
 from nmm.diagnosis.error_bound import Departure, Samples
 from nmm.findings import Finding
 from nmm.functions.function import Row, row_scales
-from nmm.resolvers.damped_least_squares import C as ROOT
 from nmm.resolvers.damped_least_squares import DampedLeastSquares
 from nmm.robots.configuration import Configuration
 from nmm.robots.reach import Reach, joint_position, reach
@@ -117,7 +116,7 @@ def inputs_fell_short(controller: Controller, samples: Samples, found: Departure
     resolver, J = controller.resolver, samples.J[found.worst]
     values: dict[str, float] = {}
     if isinstance(resolver, DampedLeastSquares):
-        root = resolver.setup(controller.solver.dimensions).numbers[ROOT:]
+        root = resolver.setup(controller.solver.dimensions).numbers[DampedLeastSquares.root_at :]
         C = np.reshape(root, (-1, J.shape[1]))
         scaled = J / row_scales(controller.rows, controller.robot)[:, np.newaxis]
         sigma = np.linalg.svd(scaled @ C if C.size else scaled, compute_uv=False)[-1]

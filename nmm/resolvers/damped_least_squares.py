@@ -100,6 +100,8 @@ class DampedLeastSquares(Resolver):
     name: ClassVar[str] = "dls"
     exact: ClassVar[bool] = False
     more_rows: ClassVar[bool] = True
+    #: Where the root of the weights begins in the numbers of its kernel.
+    root_at: ClassVar[int] = C
     kernel: ClassVar[Kernel] = damped_least_squares
     alpha_at: ClassVar[int | None] = ALPHA
 
