@@ -46,6 +46,7 @@ from .control.steering import Steered as Steered
 from .control.step import Step as Step
 from .control.step_solver import StepSolver as StepSolver
 from .control.task_rows import gain_rows as gain_rows
+from .dynamics.torques import torques_along as torques_along
 from .functions.function import Evaluation as Evaluation
 from .functions.function import Function as Function
 from .functions.function import LiveNumbers as LiveNumbers
@@ -141,6 +142,7 @@ from .robots.loading.packages import package_file as package_file
 from .robots.loading.pinocchio_layout import PinocchioModels as PinocchioModels
 from .robots.loading.provenance import PLATFORM_SOURCES as PLATFORM_SOURCES
 from .robots.loading.provenance import Provenance as Provenance
+from .robots.loading.provenance import accelerations_of as accelerations_of
 from .robots.loading.provenance import loaded_parts as loaded_parts
 from .robots.loading.provenance import provenance_of as provenance_of
 from .robots.loading.report import FileReport as FileReport

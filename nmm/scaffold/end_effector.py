@@ -9,7 +9,6 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.findings import Finding
-from nmm.platforms.wheel_layout import STEERING, SWIVELS, is_named
 from nmm.robots.reach import arm_branches, arm_end, reach
 from nmm.robots.robot import Robot
 from nmm.text_format import counted
@@ -19,7 +18,7 @@ _NO_ROOM = 1e-6
 #: A point so near to the axle, m, cannot be led aside.
 _NO_LEVER = 0.02
 #: Parts of the names of what rolls, and of what is above it.
-_ROLLING = ("wheel", "tire", "tyre", "suspension", *STEERING, *SWIVELS)
+_ROLLING = ("wheel", "tire", "tyre", "suspension", "steer", "caster", "castor", "swivel")
 #: From rest to a path's speed, s.
 _RUN_UP = 2.0
 #: Radii of circles, lengths of lines, and of those on a fixed base, as shares of the arm's reach.
@@ -78,7 +77,7 @@ def wheel_frames(robot: Robot) -> set[str]:
         above = model.frames[frame.parentFrame]
         below = above.name in found and above.parentJoint == frame.parentJoint
         own = {frame.name, str(model.names[frame.parentJoint])}
-        if below or own & parts or is_named(" ".join(own), _ROLLING):
+        if below or own & parts or any(word in " ".join(own).lower() for word in _ROLLING):
             found.add(frame.name)
     return found
 
