@@ -3,8 +3,8 @@
 *Noted* is what MuJoCo moves, weighs or holds otherwise than this robot will: loading says so, with its line,
 or refuses the file by name. *Without effect* is what says nothing of motion, shape, mass or limits."""
 
-from collections.abc import Iterator, Mapping
-from typing import Literal, NamedTuple
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Literal, NamedTuple, cast
 
 from nmm.findings import Finding
 from nmm.robots.loading.xml_tree import Element
@@ -223,8 +223,7 @@ def _walk(element: Element, path: str) -> Iterator[tuple[str, str, Element]]:
             yield "not known to this version", f"{tag} {attribute}", element
         elif how == "noted" and value.split() != _USUAL.get(attribute, "").split():
             yield _ATTRIBUTE, f"{tag} {attribute}", element
-    for part in element:
-        assert isinstance(part, Element)
+    for part in cast(Iterable[Element], element):  # as the tree's reader makes them
         yield from _walk(part, _below(path, element.tag, part.tag))
 
 

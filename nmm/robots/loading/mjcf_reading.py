@@ -197,7 +197,7 @@ class _Model:
         for number, end in enumerate(ends):
             place.rotation = self._numbers.turned(number * angles)
             for part in parts:
-                yield moved(renamed(part, lambda _, name, end=end: name + end), place)  # type: ignore[misc]
+                yield moved(renamed(part, lambda _, name, end=end: name + end), place)  # type: ignore[misc]  # a default
             place = place * at(offset)
 
     def _follow(self, names: set[tuple[str, str]], ends: Sequence[str]) -> None:
