@@ -271,3 +271,14 @@ def test_a_run_says_that_wheels_slid(tmp_path: Path) -> None:
     (found,) = of_code(runs[0.0, 0.0].findings, "wheels_slid")
     turning = np.abs(runs[0.0, 0.0].q_dot[:, 2]).max()
     assert found.values["speeds"] == pytest.approx(dict.fromkeys(DRIVE, 0.3 * turning), rel=1e-9)
+
+
+def test_what_is_called_a_wheel_and_cannot_roll_is_no_silence(tmp_path: Path) -> None:
+    """Wheels drawn at 17 degrees: the note on a base without wheels names them."""
+    lying = [
+        wheel(f"{side}_wheel", "base_link", f"0 {y} 0.1", rpy="0.3 0 0")
+        for side, y in (("left", 0.2), ("right", -0.2))
+    ]
+    (note,) = of_code(nmm.load(write(tmp_path / "lying.urdf", base(*lying))).notes, "no_wheels")
+    assert note.values["names"] == [*DRIVE]
+    assert "left_wheel, right_wheel cannot" in str(note)

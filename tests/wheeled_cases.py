@@ -262,6 +262,17 @@ CASES = {
         "differential",
         ("left_suspension", "right_suspension"),
     ),
+    "with camber": Case(
+        base(
+            wheel("left_wheel", "base_link", "0 0.2 0.1", rpy="-0.05 0 0"),
+            wheel("right_wheel", "base_link", "0 -0.2 0.1", rpy="0.05 0 0"),
+        ),
+        "unicycle",
+        DRIVE,
+        {},
+        {"radius": 0.1, "track": 0.4},
+        "differential",
+    ),
     "sprung, with casters": Case(base(SPRUNG, SWIVELS), "unicycle", DRIVE),
     "rockers": Case(
         base(ROCKERS),

@@ -146,8 +146,10 @@ WORDS = placed(
             "links that are called wheels do not turn in the file ({names}): its root is taken for a "
             "unicycle, --platform for another"
         ),
-        "no_wheels": "no wheels in the file: its root link is taken for a unicycle; --platform for another, "
-        "--platform fixed for an arm that stands",
+        "no_wheels": lambda *, names=(), **_: (
+            f"no wheels in the file{f' that roll ({few(names)} cannot)' if names else ''}: its root link is "
+            "taken for a unicycle; --platform for another, --platform fixed for an arm that stands"
+        ),
         "wheels_by_shape": _names("wheels by their shapes, not their names: {names}"),
         "steering_held": _names("they steer, and stand still at zero: {names}"),
         "undercarriage_held": lambda *, values, **_: (

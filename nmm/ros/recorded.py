@@ -185,15 +185,9 @@ class Recorded:
             raise InputError(
                 f"has no joint of {self.robot.name}", where=log.path, expected=" or ".join(self.own[:4])
             )
-        endless = {
-            name
-            for name, unit, limited in zip(
-                self.robot.q_names, self.robot.q_units, self.robot.limited, strict=True
-            )
-            if unit == "rad" and not limited.any()
-        }
-        for name in endless & self.positions.keys():
-            _count_on(self.positions[name])
+        for name, endless in zip(self.robot.q_names, self.robot.endless, strict=True):
+            if endless and name in self.positions:
+                _count_on(self.positions[name])
 
 
 def _count_on(track: Track) -> None:

@@ -23,8 +23,8 @@ from nmm.robots.loading.drive_marks import DriveMarks, rollers_named
 from nmm.robots.loading.joint_kinds import axis, is_revolute, joint_limits
 from nmm.robots.loading.tyres import Tyre, tyres
 
-# How far from upright a steering column may lean, rad.
-_LEAN = 0.2
+# How far from upright a steering column may lean, and a wheel's axis from level (camber), rad.
+_LEAN, _CAMBER = 0.2, 0.1
 # A centre so near the root link's xy plane lies in it: the plane is then not the ground.
 _ON_PLANE = 1e-6
 _SHORT_NAMES = re.compile("caster|castor|(?<![a-z])[lr]w(?![a-z])")
@@ -147,6 +147,11 @@ class Measured:
         ]
         return any(is_named(name, _WHEELS) for name in (str(self.model.names[joint]), *links))
 
+    @property
+    def named_wheels(self) -> list[str]:
+        """Joints that are called wheels, whatever they do."""
+        return [name for name, joint in self.joints.items() if self.is_named_wheel(joint)]
+
     @cached_property
     def fixed_wheels(self) -> list[str]:
         """Links on the root's body that are called wheels: they do not turn."""
@@ -172,7 +177,7 @@ class Measured:
             return {"why": "not_turning"}
         if joint in list(self.model.parents):
             return {"why": "joint_below"}
-        if abs(self.axis(joint)[2]) > PARALLEL:
+        if abs(self.axis(joint)[2]) > _CAMBER:
             return {"why": "axis_not_level"}
         return None
 

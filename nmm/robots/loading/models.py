@@ -225,8 +225,9 @@ def _platform(made: Locked, source: Source, options: Options, base: VirtualBase 
             if base is not None and origin == "default":
                 kind, origin = base.kind or kind, "base"
             if origin == "default":
-                names = measured.fixed_wheels
-                told = (Finding("wheels_fixed", {"names": names}) if names else Finding("no_wheels"),)
+                fixed, named = measured.fixed_wheels, measured.named_wheels
+                none = Finding("no_wheels", {"names": named} if named else {})
+                told = (Finding("wheels_fixed", {"names": fixed}) if fixed else none,)
         platform: Platform
         if isinstance(kind, Platform):
             platform = kind

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from nmm.platforms.wheel_layout import HITCHES, Rollers, is_named
+from nmm.platforms.wheel_layout import HITCHES, PARALLEL, Rollers, is_named
 from nmm.robots.loading.joint_kinds import is_revolute, joint_limits
 from nmm.robots.loading.measured_joints import Asked, Measured, Undercarriage, expect_names
 
@@ -73,7 +73,7 @@ class _Search:
 
     def _is_level(self, joint: int) -> bool:
         model = self.measured.model
-        return is_revolute(model.joints[joint]) and abs(self.measured.axis(joint)[2]) <= 0.01
+        return is_revolute(model.joints[joint]) and abs(self.measured.axis(joint)[2]) <= PARALLEL
 
     def _is_meant(self, joint: int) -> bool:
         """Whether its name, or the caller, says that it is a wheel."""
