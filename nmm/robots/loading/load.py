@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 
 from nmm.errors import RobotError, expect_kind, one_or_several
 from nmm.platforms import Platform, platform_by_name
-from nmm.robots.loading.models import Options, robot_from
+from nmm.robots.loading.models import robot_from
 from nmm.robots.loading.packages import PACKAGE, package_file
+from nmm.robots.loading.platform_choice import Options
 from nmm.robots.loading.source import Source, read_file, read_model, source_path
 from nmm.robots.loading.srdf_fitting import with_srdf, with_states
 from nmm.robots.robot import Robot

@@ -1,23 +1,20 @@
 """From what was read to a `Robot`: joints locked, reference point, platform, wheels, in this order."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike
 
-from nmm.arrays import array
 from nmm.errors import InputError, RobotError, expect_known
 from nmm.findings import Finding
-from nmm.platforms import AddedJoint, FixedBase, Layout, Platform, platform_by_name
-from nmm.platforms.recognition import AT_ROOT, Pose, recognized, reference_of
+from nmm.platforms import AddedJoint, FixedBase, Layout, Platform
+from nmm.platforms.recognition import AT_ROOT
 from nmm.platforms.wheel_layout import MAIN_BODY, standing_wheels, wheels_on
 from nmm.robots.loading.chain import CHAIN, Rebuilt, rebuild
 from nmm.robots.loading.ground import slip_warnings
 from nmm.robots.loading.locking import Locked, add_pairs, among_coordinates, at_zero, limit_notes, with_locked
 from nmm.robots.loading.measured_joints import Asked, Measured, speed_limit
-from nmm.robots.loading.measured_layout import measure_layout
 from nmm.robots.loading.names_apart import (
     Names,
     apart,
@@ -29,41 +26,30 @@ from nmm.robots.loading.names_apart import (
     with_names,
 )
 from nmm.robots.loading.passive_wheels import (
-    differing_radii,
-    differing_tyres,
     find_wheels,
     held_joints,
     without_radius,
 )
+from nmm.robots.loading.platform_choice import (
+    Options,
+    axle_placement,
+    choose_platform,
+    is_fixed_base,
+    measured_of,
+    yaw_of,
+)
 from nmm.robots.loading.provenance import Parts, acceleration_notes
 from nmm.robots.loading.source import Source
-from nmm.robots.loading.virtual_base import VirtualBase, find_virtual_base, gantry
+from nmm.robots.loading.virtual_base import find_virtual_base, gantry
 from nmm.robots.loading.wheel_search import find_undercarriage
 from nmm.robots.robot import Robot
 from nmm.robots.wheel import Wheel
-
-# How far from upright a frame's z axis may be: files write pi/2 with a few digits.
-_LEVEL = 1e-3
-#: Adds its pairs to the collision shapes on a model.
-AddPairs = Callable[[pin.Model, pin.GeometryModel], None]
-
-
-@dataclass(frozen=True)
-class Options:
-    platform: Platform | str | None = None
-    wheels: Asked = None
-    lock: Mapping[str, float] = field(default_factory=dict)
-    axle: str | ArrayLike | None = None
-    steer: Sequence[str] = ()
-    name: str | None = None
-    limits: Mapping[str, float] = field(default_factory=dict)
-    add_pairs: AddPairs | None = None
 
 
 def robot_from(source: Source, options: Options) -> Robot:
     """`RobotError` for an unusable joint, an unknown joint or frame, a platform that does not fit, wheels
     that leave open how they drive."""
-    where, is_fixed = source.where, _is_fixed(source, options)
+    where, is_fixed = source.where, is_fixed_base(source, options)
     source, names = apart(source)
     options = _naming(options, names)
     rebuilt = rebuild(source.model, (source.visual_model, source.collision_model), where)
@@ -77,13 +63,13 @@ def robot_from(source: Source, options: Options) -> Robot:
     if base is not None and not is_fixed:
         made = _standing(made, dict.fromkeys(base.joints, 0.0), where)
         made = replace(made, rebuilt=_about(made.rebuilt, base.place, where))
-    undercarriage = find_undercarriage(_measured(made, source), options.wheels, stated)
+    undercarriage = find_undercarriage(measured_of(made, source), options.wheels, stated)
     if undercarriage.held:
         made = _standing(made, undercarriage.held, where)
     source = replace(source, undercarriage=undercarriage)
     if options.axle is not None:
-        made = _moved(made, _axle_placement(made.rebuilt.model, options.axle, where), where)
-    chosen = _platform(made, source, options, base)
+        made = _moved(made, axle_placement(made.rebuilt.model, options.axle, where), where)
+    chosen = choose_platform(made, source, options, base)
     platform, layout = chosen.platform, chosen.layout
     if options.axle is None and chosen.reference != AT_ROOT:
         x, y, yaw = chosen.reference
@@ -138,16 +124,11 @@ def _sliding(layout: Layout) -> frozenset[str]:
     return frozenset({wheel.joint for wheel in wheels_on(layout, MAIN_BODY)} - standing)
 
 
-def _measured(made: Locked, source: Source) -> Measured:
-    visual, collision = made.rebuilt.geometries
-    return Measured(made.rebuilt.model, (collision, visual), source.where, source.marks, source.undercarriage)
-
-
 def _moved(made: Locked, placement: pin.SE3, where: str) -> Locked:
     """The model whose coordinates are of the point and x axis of `placement`, in the root link."""
     rebuilt = made.rebuilt
     moved = rebuild(rebuilt.model, rebuilt.geometries, where, root=placement.inverse())
-    reached = {"at": (placement.translation + 0.0).tolist(), "yaw": _yaw(placement)}
+    reached = {"at": (placement.translation + 0.0).tolist(), "yaw": yaw_of(placement)}
     notes = (*rebuilt.notes, Finding("reference_moved", reached))
     return replace(made, rebuilt=replace(moved, notes=notes))
 
@@ -156,97 +137,6 @@ def _naming(options: Options, names: Names) -> Options:
     """The options with other names of joints and frames."""
     given = {key: with_names(getattr(options, key), names) for key in ("lock", "wheels", "axle", "steer")}
     return replace(options, **given)
-
-
-def _axle_placement(model: pin.Model, axle: str | ArrayLike, where: str) -> pin.SE3:
-    """Pose of the platform's reference point in the root link (`load`'s `axle`): a position and a yaw."""
-    if isinstance(axle, str):
-        return _level_frame(model, axle, f"{where}: axle")
-    try:
-        numbers = array(axle, "axle")
-    except InputError as error:
-        raise error.at(where, RobotError) from None
-    if numbers.shape not in ((2,), (3,), (4,)):
-        expected = "a frame, or x and y, z (m) and yaw (rad) behind them where they are not 0"
-        raise RobotError(where=f"{where}: axle", expected=expected, got=axle)
-    x, y, z, yaw = np.append(numbers, np.zeros(4 - len(numbers)))
-    return pin.SE3(pin.utils.rotate("z", float(yaw)), np.array([x, y, z]))
-
-
-def _level_frame(model: pin.Model, name: str, where: str) -> pin.SE3:
-    """Position and yaw of a level frame of the root link's body."""
-    known = {frame.name: frame for frame in model.frames}
-    fixed = {frame.name: frame for frame in model.frames if frame.parentJoint == len(CHAIN)}
-    if name in known and name not in fixed:
-        joint = model.names[known[name].parentJoint]
-        what = f"frame {name!r} is not on the root link's body: joint {joint} moves it"
-        raise RobotError(what, where=where, got=name)
-    expect_known("frame", name, fixed, where, RobotError)
-    placement = fixed[name].placement
-    if placement.rotation[2, 2] < 1.0 - 0.5 * _LEVEL**2:
-        raise RobotError(f"frame {name!r} is tilted, expected its z axis upwards", where=where, got=name)
-    return pin.SE3(pin.utils.rotate("z", _yaw(placement)), np.array(placement.translation))
-
-
-def _yaw(placement: pin.SE3) -> float:
-    return float(np.arctan2(placement.rotation[1, 0], placement.rotation[0, 0]))
-
-
-@dataclass(frozen=True)
-class _Chosen:
-    """A platform, who chose its kind, the file's wheels and joints seen from its reference point, where that
-    is in the root link, what is to be told, and where the platform is not what the file's wheels are."""
-
-    platform: Platform
-    origin: str
-    layout: Layout | None = None
-    reference: Pose = AT_ROOT
-    told: tuple[Finding, ...] = ()
-    contradictions: tuple[Finding, ...] = ()
-
-    @property
-    def remarks(self) -> tuple[Finding, ...]:
-        return (*self.told, *self.contradictions)
-
-
-def _platform(made: Locked, source: Source, options: Options, base: VirtualBase | None) -> _Chosen:
-    kind: Platform | str | None = source.platform if options.platform is None else options.platform
-    origin = "file" if options.platform is None else "given"
-    if _is_fixed(source, options):
-        return _Chosen(FixedBase(), origin)  # there is nothing to measure
-    measured = _measured(made, source)
-    layout = measure_layout(measured, options.wheels, options.steer)
-    told: tuple[Finding, ...] = ()
-    reference = AT_ROOT
-    try:
-        if kind is None:
-            found = recognized(layout)
-            kind, told, origin = found.kind, found.notes, "wheels" if found.is_told else "default"
-            if base is not None and origin == "default":
-                kind, origin = base.kind or kind, "base"
-            if origin == "default":
-                fixed, named = measured.fixed_wheels, measured.named_wheels
-                none = Finding("no_wheels", {"names": named} if named else {})
-                told = (Finding("wheels_fixed", {"names": fixed}) if fixed else none,)
-        platform: Platform
-        if isinstance(kind, Platform):
-            platform = kind
-        else:
-            if options.axle is None:
-                reference = reference_of(layout, kind)
-                layout = layout.moved(*reference) if reference != AT_ROOT else layout
-            platform = platform_by_name(kind).fit(layout)
-        contradictions = [*platform.compared(layout), *differing_radii(measured, options.wheels)]
-    except InputError as error:
-        raise error.at(source.where, RobotError) from None
-    if layout.wheels and platform.lengths:
-        told = (*told, *differing_tyres(measured, [wheel.joint for wheel in layout.wheels]))
-    return _Chosen(platform, origin, layout, reference, told, tuple(contradictions))
-
-
-def _is_fixed(source: Source, options: Options) -> bool:
-    chosen = source.platform if options.platform is None else options.platform
-    return isinstance(chosen, FixedBase) or chosen == FixedBase.name
 
 
 def _turned_up(made: Locked, platform: Platform, where: str) -> Locked:
@@ -342,7 +232,7 @@ def _without_wheels(
             left = {str(name) for name in whole.names}
             kept = [name for name in asked if name in left]
             asked = {name: asked[name] for name in kept} if isinstance(asked, Mapping) else kept
-        wheels, notes = find_wheels(_measured(made, source), asked, own, platform, sliding)
+        wheels, notes = find_wheels(measured_of(made, source), asked, own, platform, sliding)
     names = list(dict.fromkeys(name for wheel in wheels for name in wheel.joints))
     model = whole
     if names:
@@ -391,7 +281,7 @@ def _standing(made: Locked, values: Mapping[str, float], where: str) -> Locked:
 def _with_held_wheels(made: Locked, asked: Asked, source: Source) -> Locked:
     """The model of a base that does not move, with its wheels and their mimic joints fixed."""
     display = made.rebuilt
-    names, notes = held_joints(_measured(made, source), asked)
+    names, notes = held_joints(measured_of(made, source), asked)
     if not names:
         return replace(made, rebuilt=replace(display, notes=(*display.notes, *notes)))
     still = _standing(made, dict.fromkeys(names, 0.0), source.where)
@@ -411,7 +301,7 @@ def _with_idle_parts_held(
         for pivot in layout.pivots
         if pivot.steers and pivot.joint not in (*own, *carrying, *follows)
     ]
-    unknown = without_radius(_measured(made, source), layout)
+    unknown = without_radius(measured_of(made, source), layout)
     notes = [Finding("steering_held", {"names": idle})] if idle else []
     notes += [Finding("radius_unknown", {"names": [*unknown]})] if unknown else []
     if not idle and not unknown:

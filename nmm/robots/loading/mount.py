@@ -19,7 +19,8 @@ from nmm.platforms import FixedBase
 from nmm.robots.loading.chain import CHAIN, rebuild
 from nmm.robots.loading.load import load
 from nmm.robots.loading.locking import add_pairs, told_apart
-from nmm.robots.loading.models import Options, robot_from
+from nmm.robots.loading.models import robot_from
+from nmm.robots.loading.platform_choice import Options
 from nmm.robots.loading.provenance import loaded_parts, with_wheels_fixed
 from nmm.robots.loading.source import Source
 from nmm.robots.robot import Robot, frame_index
