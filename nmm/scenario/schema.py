@@ -218,14 +218,15 @@ class ScenarioPart(Part):
                 expect(
                     self.duration >= least, "", f"at least {least:.4g} s, which the plan takes", self.duration
                 )
+        with at("resolver"):
+            resolver = own or self.resolver.make()
         with at("task"):
             sequenced = any(one.when for one in task)
             if sequenced:
                 Sequence(Stack.of(task), robot)
             levels = Stack.of(task).levels(robot)
             s, first = sum(levels), levels[0]
-            takes_more = (type(own) if own else RESOLVERS.named(self.resolver.kind)).more_rows
-            if first > robot.n_u and not sequenced and not takes_more:
+            if first > robot.n_u and not sequenced and not resolver.more_rows:
                 of = "" if len(levels) == 1 else " in the first level of priority"
                 expected = f"at most {robot.n_u} rows{of}, as many as inputs ({few(robot.u_names)})"
                 raise InputError(expected=expected, got=first)
@@ -247,7 +248,7 @@ class ScenarioPart(Part):
                 self.disturbances.build(robot, self.dt)
         steering = None if self.steering is None else self.steering.make()
         with at("resolver"):
-            resolver, added = own or self.resolver.make(), None
+            added = None
             rest = (limits, self.dt, retreat, steering or False)
             second: Any = {"order": self.order, "servo": self.servo} if self.order == 2 else {}
             if sequenced:
