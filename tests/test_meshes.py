@@ -21,7 +21,8 @@ from urdf_parts import joint, link, robot, shape, write
 
 import nmm
 from nmm import RobotError
-from nmm.robots import meshes
+from nmm.robots import mesh_files, meshes
+from nmm.robots.loading.check_parts import MESH_SUFFIXES
 from nmm.robots.loading.packages import package_file
 from nmm.robots.robot import Robot
 
@@ -69,6 +70,25 @@ def unread(geometry: pin.GeometryModel) -> int:
 
 
 # ------------------------------------------------------------------------------------------------ not before
+
+
+@pytest.mark.parametrize("suffix", MESH_SUFFIXES)
+def test_every_format_is_read_by_what_the_install_has(suffix: str, tmp_path: Path) -> None:
+    """trimesh leaves the readers' own packages to us: pyproject.toml names them."""
+    ball = trimesh.creation.icosphere(subdivisions=1, radius=0.5)
+    files = ball.export(file_type=suffix[1:])
+    for name, content in (files if isinstance(files, dict) else {"model": files}).items():
+        place = tmp_path / (name if isinstance(files, dict) else f"model{suffix}")
+        place.write_bytes(content.encode() if isinstance(content, str) else content)
+    vertices, faces = mesh_files.mesh_arrays(str(tmp_path / f"model{suffix}"))
+    assert len(faces) == len(ball.faces)
+    assert np.allclose(np.linalg.norm(vertices, axis=1), 0.5, atol=1e-6)
+
+
+def test_text_that_is_no_utf_8_is_read(tmp_path: Path) -> None:
+    path = cube(tmp_path / "cube.obj")
+    path.write_bytes("# gezeichnet für die Prüfung\n".encode("latin-1") + path.read_bytes())
+    assert len(mesh_files.mesh_arrays(str(path))[1]) == 12
 
 
 def test_no_mesh_is_read_for_control(read: list[str], tmp_path: Path) -> None:
