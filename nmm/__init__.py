@@ -4,11 +4,12 @@ Names are loaded when first used, so that `import nmm` costs nothing (`lazy_load
 names is `__init__.pyi`).
 """
 
+from importlib.util import find_spec
+
 import lazy_loader
 
 from nmm.lazy_call import interrupts_wait
-
-__version__ = "1.0.0"
+from nmm.version import __version__ as __version__
 
 #: Names that authors need, which were in front before.
 _EXTENDING = """
@@ -43,4 +44,19 @@ def __getattr__(name: str) -> object:
     if name in MOVED:
         raise AttributeError(f"nmm.{name} is now nmm.{MOVED[name]}")
     with interrupts_wait():
-        return _loaded(name)
+        try:
+            return _loaded(name)
+        except AttributeError:
+            if (added := _of_plugins(name)) is None:
+                raise
+            return added
+
+
+def _of_plugins(name: str) -> object:
+    """What a stranger's plugin adds by this name; None where none does, and for nmm's own modules."""
+    if name.startswith("_") or find_spec(f"nmm.{name}") is not None:
+        return None
+    from nmm.plugins import additions
+
+    addition = additions("front", (*__all__, *MOVED)).get(name)
+    return None if addition is None else addition.load()

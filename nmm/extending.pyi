@@ -1,5 +1,6 @@
 """What authors of platforms, tasks, resolvers and of packages above the wall need beside `nmm` itself."""
 
+from .cli.groups import OptionGroup as OptionGroup
 from .collisions import Shape as Shape
 from .collisions.obstacle import obstacle_as_json as obstacle_as_json
 from .collisions.obstacle import obstacle_from_json as obstacle_from_json
@@ -115,6 +116,7 @@ from .platforms.wheel_layout import Pivot as Pivot
 from .platforms.wheel_layout import RollingJoint as RollingJoint
 from .platforms.wheeled.descriptions import WheelDescription as WheelDescription
 from .platforms.wheeled.platform import WheelRate as WheelRate
+from .plugins import Plugin as Plugin
 from .resolvers import Dimensions as Dimensions
 from .resolvers import Resolver as Resolver
 from .resolvers import Setup as Setup
@@ -211,6 +213,11 @@ from .runs.verdict import Awaited as Awaited
 from .runs.verdict import FindingLine as FindingLine
 from .runs.verdict import Verdict as Verdict
 from .runs.verdict import verdict_of as verdict_of
+from .scenario.keys import at as at
+from .scenario.numbers import NumberList as NumberList
+from .scenario.numbers import Positive as Positive
+from .scenario.sections import Making as Making
+from .scenario.sections import Section as Section
 from .sweeps import SweepResult as SweepResult
 from .tables import Table as Table
 from .tables.table import Quantity as Quantity

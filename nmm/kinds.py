@@ -5,33 +5,90 @@ A class is imported when it is first asked for, so that the names alone cost not
 
 import re
 from collections import UserDict
+from collections.abc import Callable, Iterator
 from pkgutil import resolve_name
-from typing import Any
+from typing import Any, TypeVar
 
 from nmm.errors import expect_known
+from nmm.plugins import Addition, additions, complain
+
+T = TypeVar("T")
 
 
 class Kinds(UserDict[str, Any]):
-    """Classes, "package.module:Class", by name in the order of listings; errors call one of them `what`."""
+    """Classes, "package.module:Class", by name in the order of listings; errors call one of them `what`.
+
+    Plugins' follow nmm's own: shipped ones where a name is not among these, and strangers' (`nmm.plugins`)
+    where it is not among those either, or all are listed.
+    """
 
     def __init__(self, what: str, **classes: str) -> None:
         super().__init__(classes)
         self.what = what
+        self._own = tuple(classes)
+        self._plugins: dict[str, str] = {}  #: the plugin of each name that is one's
+        self._left_out: set[str] = set()
 
     def __getitem__(self, name: str) -> Any:
-        found = self.data[name]
-        if isinstance(found, str):
-            found = self.data[name] = resolve_name(found)
-        return found
+        if name not in self:
+            raise KeyError(name)
+        kind = self.data[name]
+        if isinstance(kind, str):
+            kind = self.data[name] = resolve_name(kind)
+        elif isinstance(kind, Addition):
+            kind = kind.load()
+            if kind is None:
+                self._leave_out(name)
+                raise KeyError(name)
+            self.data[name] = kind
+        return kind
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.data or name in self._added(foreign=False) or name in self._added()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._added())
+
+    def __len__(self) -> int:
+        return len(self._added())
+
+    def _added(self, foreign: bool = True) -> dict[str, Any]:
+        """The table, with what plugins add."""
+        for name, addition in additions(self.what, self._own, foreign).items():
+            if name not in self._left_out:
+                self._plugins.setdefault(name, addition.plugin)
+                self.data.setdefault(name, addition)
+        return self.data
+
+    def _leave_out(self, name: str) -> None:
+        del self.data[name]
+        self._left_out.add(name)
+
+    def made(self, make: Callable[[str, Any], T]) -> dict[str, T]:
+        """What is made of each class, by name; a plugin's class that does not allow it is left out."""
+        results = {}
+        for name in list(self):
+            try:
+                results[name] = make(name, self[name])
+            except Exception as error:  # whatever a stranger's class is
+                if name not in self._plugins:
+                    raise
+                if name in self.data:
+                    text = f"{self.what} {name}: {type(error).__name__}: {error}; it is left out"
+                    complain(self._plugins[name], text)
+                    self._leave_out(name)
+        return results
 
     def named(self, name: str) -> Any:
-        expect_known(self.what, name, self.data)
+        if name not in self:
+            expect_known(self.what, name, list(self))
         return self[name]
 
     def words(self, name: str) -> str:
         """What a class is called in a sentence: "reduced gradient"; the class is not imported."""
-        found = self.data[name]
-        own = found.rpartition(":")[2] if isinstance(found, str) else found.__name__
+        kind = self.data[name]
+        entry = kind.entry if isinstance(kind, Addition) else kind
+        own = entry.rpartition(":")[2] if isinstance(entry, str) else entry.__name__
         words = re.findall("[A-Z][a-z]*", own)
         return " ".join(word if word in NAMES else word.lower() for word in words)
 
@@ -67,7 +124,6 @@ TASKS = Kinds(
     center_of_mass="nmm.functions.tasks.position:CenterOfMass",
     coordinates="nmm.functions.tasks.linear_coordinates:LinearCoordinates",
     posture="nmm.functions.tasks.linear_coordinates:Posture",
-    parking="nmm.plans.parking:Parking",
 )
 REFERENCES = Kinds(
     "reference",

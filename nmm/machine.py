@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 from nmm.errors import InputError
+from nmm.version import __version__
 
 
 def made_with() -> dict[str, str | int]:
@@ -20,8 +21,6 @@ def made_with() -> dict[str, str | int]:
 def versions() -> str:
     """Two lines for a report of a fault: nmm; Python and libraries, which are not imported for it."""
     from importlib import metadata
-
-    from nmm import __version__
 
     told = [f"Python {platform.python_version()}"]
     for package in ("pin", "numpy", "numba"):
@@ -37,8 +36,6 @@ def _found() -> tuple[tuple[str, str | int], ...]:
     import numba
     import numpy
     import pinocchio
-
-    from nmm import __version__
 
     return (
         ("nmm", __version__),

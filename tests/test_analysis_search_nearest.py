@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from nmm.analysis.search.family import values_text
 from nmm.analysis.search.many_starts import find_singularities
 from nmm.analysis.search.nearest import nearest_singularity
-from nmm.cli.singularities import search_command, show_nearest, show_search
+from nmm.cli.singularity_options import search_command, show_nearest, show_search
 from nmm.cli.subjects import studied
 from nmm.functions.tasks import CallableFunction, Position
 from nmm.robots.loading import load

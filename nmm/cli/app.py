@@ -1,24 +1,22 @@
 """The commands in the order in which the help lists them; those that list what is bundled."""
 
 import re
-from typing import Annotated
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any
 
 import typer
 
 from nmm.bundled import bundled_robots, bundled_scenarios
 from nmm.cli.descriptions import info
-from nmm.cli.logs import export
 from nmm.cli.mapping import map_measures
 from nmm.cli.options import flag
 from nmm.cli.output import show_table, show_text
-from nmm.cli.planning import plan
-from nmm.cli.playing import drive, play, render, view
 from nmm.cli.redundancy import laps, redundancy
 from nmm.cli.robot_files import check, init
 from nmm.cli.runs import compare, paper, run
 from nmm.cli.singularities import singularities
-from nmm.cli.sweeping import sweep
 from nmm.cli.torques import torques
+from nmm.plugins import additions, complain, plugins
 
 app = typer.Typer(
     name="nmm",
@@ -104,22 +102,32 @@ def robots() -> None:
     show_table(["robot", "what it is", "arguments (m, rad)"], rows)
 
 
-for _command in (
-    run,
-    compare,
-    plan,
-    paper,
-    play,
-    render,
-    export,
-    info,
-    init,
-    check,
-    view,
-    drive,
-    singularities,
-):
-    app.command()(_command)
-app.command("map")(map_measures)
-for _command in (redundancy, laps, torques, sweep, scenarios, robots):
-    app.command()(_command)
+def with_plugins(commands: Mapping[str, Callable[..., Any]]) -> dict[str, Callable[..., Any]]:
+    """The commands with those of plugins, each behind the one that its plugin names, or at the end."""
+    functions, order = dict(commands), list(commands)
+    added = additions("commands", commands)
+    for plugin in plugins():
+        for name in (name for name in plugin.commands if name in added and added[name].plugin == plugin.name):
+            function = added[name].load()
+            if function is None:
+                continue
+            try:
+                single = typer.Typer()
+                single.command(name)(function)
+                typer.main.get_command(single)
+            except Exception as error:  # whatever a stranger's function takes
+                complain(plugin.name, f"command {name}: {type(error).__name__}: {error}; it is left out")
+                continue
+            functions[name] = function
+            before = plugin.after.get(name)
+            order.insert(order.index(before) + 1 if before in order else len(order), name)
+    return {name: functions[name] for name in order}
+
+
+COMMANDS: dict[str, Callable[..., Any]] = {
+    command.__name__: command for command in (run, compare, paper, info, init, check, singularities)
+}
+COMMANDS["map"] = map_measures
+COMMANDS |= {command.__name__: command for command in (redundancy, laps, torques, scenarios, robots)}
+for _name, _command in with_plugins(COMMANDS).items():
+    app.command(_name)(_command)

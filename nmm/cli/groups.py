@@ -5,10 +5,10 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import Field, dataclass, fields, is_dataclass
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_origin, get_type_hints
 
 import typer
 from typer.models import ParameterInfo
@@ -26,11 +26,88 @@ from nmm.cli.options import (
 )
 from nmm.errors import InputError, expect_known
 from nmm.kinds import PLATFORMS
+from nmm.plugins import complain, groups_of_options
 from nmm.text_format import listed
 
 if TYPE_CHECKING:
     from nmm.ellipsoid_options import Wanted
     from nmm.figure_options import FigureOptions
+
+
+class OptionGroup:
+    """Options that a plugin adds to a command: a dataclass, each field's default a `typer.Option`."""
+
+    #: The options that ask for its answer in place of the command's: "--search".
+    answers: ClassVar[tuple[str, ...]] = ()
+
+    def asked(self) -> str:
+        """The option that asks for its answer; "" where none was used."""
+        return ""
+
+    def check(self) -> None:
+        """`InputError` for options that do not go together."""
+
+    def refuse(self) -> None:
+        """`InputError` for an option that was used where the command has nothing that it is of."""
+
+    def answer(self, *subject: Any) -> int | None:
+        """Answer for what the command is about: its exit status; None where the command goes on."""
+        return None
+
+
+@dataclass(frozen=True)
+class AddedOptions:
+    """The groups of options that plugins have at one place of a command, as they were used."""
+
+    groups: tuple[OptionGroup, ...]
+
+    @property
+    def answers(self) -> list[str]:
+        return [option for group in self.groups for option in group.answers]
+
+    def asked(self) -> str:
+        return next((option for group in self.groups if (option := group.asked())), "")
+
+    def check(self) -> None:
+        for group in self.groups:
+            group.check()
+
+    def refuse(self) -> None:
+        for group in self.groups:
+            group.refuse()
+
+    def answer(self, *subject: Any) -> int | None:
+        """The exit status of the first that answers, those before that were asked; None where none does."""
+        for group in sorted(self.groups, key=lambda group: not group.asked()):
+            if (status := group.answer(*subject)) is not None:
+                return status
+        return None
+
+
+@dataclass(frozen=True)
+class PlaceOfOptions:
+    """Of a parameter `AddedOptions`: the place in a command where plugins add options, by its name."""
+
+    name: str
+
+    def groups(self, taken: set[str]) -> list[type[OptionGroup]]:
+        """Plugins' groups; one is left out that has an option which the command or another group has."""
+        groups: list[type[OptionGroup]] = []
+        for addition in groups_of_options(self.name):
+            group = addition.load()
+            if group is None:
+                continue
+            fits = isinstance(group, type) and issubclass(group, OptionGroup) and is_dataclass(group)
+            names = {one.name for one in fields(group)} if fits else set()
+            if not fits or names & taken:
+                what = (
+                    f"options that are there: {listed(sorted(names & taken))}" if fits else "no OptionGroup"
+                )
+                complain(addition.plugin, f"{addition.entry}: {what}; it is left out")
+                continue
+            taken |= names
+            groups.append(group)
+        return groups
 
 
 def command(function: Callable[..., int | None]) -> Callable[..., int | None]:
@@ -39,10 +116,17 @@ def command(function: Callable[..., int | None]) -> Callable[..., int | None]:
     From Python it is called with the options: `redundancy("unicycle_2r", task=["position"])`.
     """
     groups: dict[str, type] = {}
+    added: dict[str, list[type[OptionGroup]]] = {}
     parameters: list[inspect.Parameter] = []
-    for name, parameter in _typed(function).items():
+    own = _typed(function)
+    taken = {name for name, parameter in own.items() if not _is_group(parameter.annotation)}
+    taken |= {one.name for parameter in own.values() for one in _fields(parameter.annotation)}
+    for name, parameter in own.items():
         hint = parameter.annotation
-        if is_dataclass(hint) and isinstance(hint, type):
+        if (place := _place_of(hint)) is not None:
+            added[name] = place.groups(taken)
+            parameters += [one for group in added[name] for one in _typed(group).values()]
+        elif is_dataclass(hint) and isinstance(hint, type):
             groups[name] = hint
             parameters += _typed(hint).values()
         else:
@@ -62,16 +146,31 @@ def command(function: Callable[..., int | None]) -> Callable[..., int | None]:
             name: value.default if isinstance(value, ParameterInfo) else value
             for name, value in bound.arguments.items()
         }
-        made = {
-            name: group(**{field.name: given.pop(field.name) for field in fields(group)})
-            for name, group in groups.items()
-        }
+
+        def filled(group: type) -> Any:
+            return group(**{field.name: given.pop(field.name) for field in fields(group)})
+
+        made = {name: filled(group) for name, group in groups.items()}
+        made |= {name: AddedOptions(tuple(map(filled, several))) for name, several in added.items()}
         return function(**made, **given)
 
     del whole.__wrapped__
     whole.__signature__ = signature  # type: ignore[attr-defined]  # what typer reads
     whole.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return whole
+
+
+def _is_group(hint: Any) -> bool:
+    return _place_of(hint) is not None or (is_dataclass(hint) and isinstance(hint, type))
+
+
+def _fields(hint: Any) -> tuple[Field[Any], ...]:
+    return fields(hint) if is_dataclass(hint) and isinstance(hint, type) else ()
+
+
+def _place_of(hint: Any) -> PlaceOfOptions | None:
+    note = hint.__metadata__[0] if get_origin(hint) is Annotated else None
+    return note if isinstance(note, PlaceOfOptions) else None
 
 
 def _typed(made: Callable[..., Any]) -> dict[str, inspect.Parameter]:

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from nmm.cli.groups import command
+from nmm.cli.groups import OptionGroup, command
 from nmm.cli.interrupts import shielded
 from nmm.cli.options import flag, names_of, option
 from nmm.cli.output import OK, show_table, show_text, warn
@@ -52,7 +52,7 @@ def export(
 
 
 @dataclass(frozen=True)
-class OfBag:
+class LogOptions(OptionGroup):
     """Where a robot's messages are in a log, and what its frames are called."""
 
     joints: str | None = option("TOPIC,...", "Joint states of the robot's log.", show="joint_states")
@@ -89,8 +89,13 @@ class OfBag:
         if asked := [*self.keywords()]:
             raise InputError("there is no log: nmm compare RUN BAG", where=f"--{asked[0]}")
 
+    def answer(self, *subject: Any) -> int | None:
+        """Of a run's folder, a log and where to write: how far the log's motion is from the run's."""
+        source, log, out = subject
+        return compare_with_bag(source, log, out, self)
 
-def compare_with_bag(source: str, bag: Path, out: Path | None, names: OfBag) -> int:
+
+def compare_with_bag(source: str, bag: Path, out: Path | None, names: LogOptions) -> int:
     """Tell how far a bag's motion is from a run's, and write both as a comparison."""
     from nmm.folders import comparison
     from nmm.folders.whole import check_folder

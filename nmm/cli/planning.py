@@ -77,8 +77,9 @@ def plan(
         browser.refuse("--play")
     made = _scenario(subject, to, obstacles)
     changed: dict[str, Any] = {}
-    if not made.parts.is_plan:
-        changed = {"plan": {}} if made.parts.plan is None else {"plan.track": False}
+    own = made.parts.section("plan")
+    if own is None or not own.moves:
+        changed = {"plan": {}} if own is None else {"plan.track": False}
     if start is not None:
         changed["q0"] = _coordinates(start, "--start")
     if to is not None:

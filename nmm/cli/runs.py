@@ -11,9 +11,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from nmm.cli.groups import Browser, Ellipsoids, Figures, OfRobot, command
+from nmm.cli.groups import (
+    AddedOptions,
+    Browser,
+    Ellipsoids,
+    Figures,
+    OfRobot,
+    PlaceOfOptions,
+    command,
+)
 from nmm.cli.interrupts import shielded
-from nmm.cli.logs import OfBag, compare_with_bag
 from nmm.cli.options import (
     LIMITS,
     Chosen,
@@ -95,13 +102,13 @@ def run(
     called = label or _called(made)
     folder = out or Path("runs") / f"{made.name}-{folder_name(called)}"
     check_folder(folder, is_run)
-    if made.parts.plan is None or made.parts.is_plan:
+    if not made.parts.searches:
         controller = made.controller()  # complains before there is a progress bar
     else:
         with progress(f"{made.name}, plan") as report:
             controller = made.controller(report)
     shown: AbstractContextManager[LiveRun | None] = nullcontext()
-    planned = made.parts.is_plan
+    planned = bool(made.parts.moved_by)
     if play and not planned:
         from nmm.playback import LiveRun
 
@@ -125,7 +132,7 @@ def run(
 
 
 def _called(scenario: Scenario) -> str:
-    return "PLAN" if scenario.parts.is_plan else scenario.parts.resolver.kind.upper()
+    return (scenario.parts.moved_by or scenario.parts.resolver.kind).upper()
 
 
 def _always_written(wanted: bool) -> None:
@@ -145,7 +152,7 @@ def compare(
     settings: SetOption = None,
     limits: bool | None = LIMITS,
     of_robot: OfRobot,
-    of_bag: OfBag,
+    of_log: Annotated[AddedOptions, PlaceOfOptions("compare")],
     out: Annotated[Path | None, out_option("runs/<scenario>-compare")] = None,
     html: Annotated[bool, typer.Option("--html", hidden=True, callback=_always_written)] = False,
     table: TableOption = None,
@@ -177,8 +184,11 @@ def compare(
     if str(bag).partition(":")[0] in RESOLVERS and resolvers.endswith(","):
         raise InputError(f"no blanks in --resolvers {resolvers}{bag}")
     if bag is not None:
-        return compare_with_bag(scenario, bag, out, of_bag)
-    of_bag.refuse()
+        status = of_log.answer(scenario, bag, out)
+        if status is None:
+            raise InputError("no plugin reads it", where=bag)
+        return status
+    of_log.refuse()
     several = [chosen(text, "--resolvers") for text in named(resolvers, "--resolvers")]
     changed = settings_of(settings)
     drawn: dict[str, Any] = {"ellipsoids": ellipsoids.wanted(), "figures": figures.options()}
@@ -190,8 +200,8 @@ def compare(
     check_different(several, scenarios, "--resolvers")
     name = scenarios[0].name
     run_labels = [one.label for one in several]
-    if scenarios[0].parts.is_plan:
-        scenarios = [scenarios[0], *(made.override("plan", False) for made in scenarios)]
+    if section := scenarios[0].parts.moved_by:
+        scenarios = [scenarios[0], *(made.override(section, False) for made in scenarios)]
         several = [several[0], *several]
         run_labels = ["", *run_labels]
     folder = out or Path("runs") / f"{name}-compare"
@@ -215,7 +225,7 @@ def compare(
         print_table(comparison_table(trajectories), form, folder)
         return _status("nmm compare", trajectories, folder)
     for column, made, trajectory in zip(columns, scenarios, trajectories, strict=False):
-        if len(trajectory) and not made.parts.is_plan:
+        if len(trajectory) and not made.parts.moved_by:
             controller = made.controller()
             controller.dt = trajectory.dt
             column["a control step"] = f"{1e6 * step_time(controller, trajectory):.3g} µs here"

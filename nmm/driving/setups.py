@@ -145,7 +145,9 @@ class ScenarioSetup(DriveSetup):
     at_robot = False
 
     def __init__(self, scenario: Scenario, q0: ArrayLike | None = None) -> None:
-        self.scenario = scenario if scenario.parts.plan is None else scenario.override("plan", False)
+        self.scenario = (
+            scenario if scenario.parts.section("plan") is None else scenario.override("plan", False)
+        )
         self._firsts: dict[str, float] = {}
         self.name = scenario.title or scenario.name
         self.robot = scenario.robot()

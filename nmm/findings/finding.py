@@ -8,11 +8,14 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
+from nmm.errors import few
+from nmm.plugins import complain, tables_of_findings
+
 #: A format string over values and where, or a function that takes both as keywords.
 Words = str | Callable[..., str]
 
 #: The modules beside this one with `WORDS`, a table from code to words, each code in one of them.
-SUBJECTS = ("robot_file", "robot_loading", "run", "loop", "formulas", "singularities", "redundancy", "bag")
+SUBJECTS = ("robot_file", "robot_loading", "run", "singularities", "redundancy")
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ class Finding:
     where: Mapping[str, Any] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        told = words()[self.code]
+        told = words_of(self.code)
         given = {**self.where, **self.values}
         return told.format(**given) if isinstance(told, str) else told(**given)
 
@@ -51,15 +54,33 @@ class Finding:
         return cls(told["code"], told.get("values", {}), told.get("where", {}))
 
 
-@cache
+def words_of(code: str) -> Words:
+    """The words of a code; strangers' plugins are read only where it is none of ours. `KeyError` for none."""
+    own = _words(foreign=False)
+    return own[code] if code in own else words()[code]
+
+
 def words() -> Mapping[str, Words]:
     """All codes with their words."""
-    found: dict[str, Words] = {}
+    return _words(foreign=True)
+
+
+@cache
+def _words(foreign: bool) -> Mapping[str, Words]:
+    tables: dict[str, Words] = {}
     for subject in SUBJECTS:
         table: Mapping[str, Words] = import_module(f"nmm.findings.{subject}").WORDS
-        if again := found.keys() & table.keys():
+        if again := tables.keys() & table.keys():
             raise TypeError(
                 f"nmm.findings.{subject}: codes of another subject too: {', '.join(sorted(again))}"
             )
-        found |= table
-    return found
+        tables |= table
+    for addition in tables_of_findings(foreign):
+        table = addition.load() or {}
+        if not isinstance(table, Mapping):
+            complain(addition.plugin, f"{addition.entry} is no table from codes to words; it is left out")
+            continue
+        if again := tables.keys() & table.keys():
+            complain(addition.plugin, f"codes that others have, which stay: {few(sorted(again))}")
+        tables = {**table, **tables}
+    return tables

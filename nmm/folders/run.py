@@ -98,7 +98,11 @@ def _loaded(folder: Path, robot: Robot | None) -> Trajectory:
 
     summary, file = folder / "summary.json", folder / "trajectory.npz"
     if not summary.exists() and not file.exists():
-        raise InputError(where=folder, expected="a run's folder (with trajectory.npz and nmm's summary.json)")
+        from nmm.folders.kinds import folder_kind
+
+        expected = "a run's folder (with trajectory.npz and nmm's summary.json)"
+        kind = folder_kind(folder)
+        raise InputError(where=folder, expected=expected, **({"got": f"that of a {kind}"} if kind else {}))
     told = read_checked(summary, ToldRun, FORMAT)
     found = read_arrays(file)
     check_arrays(found, file, len(told.limit_names), len(told.clearance_names))

@@ -131,11 +131,11 @@ def rollout(
         disturbances = Disturbances(**beside)
     if isinstance(subject, Scenario):
         parts = subject.parts
-        if parts.is_plan:
+        if parts.moved_by:
             raise InputError(
                 "its run is a planned motion, with one start",
-                where="rollout: plan",
-                expected="plan.track: true",
+                where=f"rollout: {parts.moved_by}",
+                expected="plan.track: true" if parts.moved_by == "plan" else f"{parts.moved_by}: false",
             )
         q0 = parts.q0 if q0 is None else q0
         duration, dt = duration or parts.duration, dt or parts.dt

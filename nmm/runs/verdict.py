@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
-from nmm.findings import Finding, words
+from nmm.findings import Finding
 from nmm.findings.run import MOTORS, line
 
 
@@ -79,7 +79,7 @@ def _finding_of(told: Mapping[str, Any]) -> Finding:
     """The finding, or its sentence if its code or values are another version's."""
     found = Finding.from_json(told)
     with suppress(LookupError, TypeError, ValueError, AttributeError, OverflowError):
-        if found.code in words() and line([found]):
+        if line([found]):
             return found
     return Finding("said", {"text": told["text"]})
 

@@ -156,13 +156,13 @@ def _reference(value: Any, read: ValidatorFunctionWrapHandler, info: ValidationI
 
 
 #: The functions of tasks, by kind.
-FUNCTION_PARTS = {kind: part_of(kind, made, FunctionPart) for kind, made in TASKS.items()}
+FUNCTION_PARTS = TASKS.made(lambda kind, made: part_of(kind, made, FunctionPart))
 #: The references, by kind; after those of time what a task can follow of the robot itself.
-REFERENCE_PARTS = {
-    kind: SPECIAL.get(kind) or part_of(kind, REFERENCES[kind], FunctionPart, **SPELLED.get(kind, {}))
-    for kind in dict.fromkeys([*REFERENCES, *SPECIAL])
-}
-REFERENCE_PARTS |= {kind: part for kind, part in FUNCTION_PARTS.items() if kind not in REFERENCE_PARTS}
+REFERENCE_PARTS: dict[str, type[FunctionPart]] = REFERENCES.made(
+    lambda kind, made: SPECIAL.get(kind) or part_of(kind, made, FunctionPart, **SPELLED.get(kind, {}))
+)
+for _kind, _part in (*SPECIAL.items(), *FUNCTION_PARTS.items()):
+    REFERENCE_PARTS.setdefault(_kind, _part)
 
 Reference = Annotated[FunctionPart, OneOf(REFERENCE_PARTS), WrapValidator(_reference)]
 Point = Annotated[Reference, BeforeValidator(_point)]

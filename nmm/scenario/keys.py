@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -102,8 +102,13 @@ class Part(BaseModel):
                     raise KeyedError((str(key),), f"this key is called {cls.renamed[key]} now")
                 if key not in cls.model_fields:
                     hint, made = cls.unknown(str(key)), partial(KeyedError, (str(key),))
-                    raise no_such("key", key, cls.model_fields, error=made, hint=hint)
+                    raise no_such("key", key, cls.known_keys(), error=made, hint=hint)
         return data
+
+    @classmethod
+    def known_keys(cls) -> Collection[str]:
+        """The keys that an error about another one lists."""
+        return cls.model_fields
 
     @classmethod
     def unknown(cls, key: str) -> str:

@@ -126,10 +126,9 @@ BASES = dict.fromkeys(
     ("manipulability", "weighted_manipulability", "directional_manipulability", "inverse_condition"),
     MaximisedPart,
 )
-OBJECTIVE_PARTS: dict[str, type[ObjectivePart]] = {
-    kind: SPECIAL.get(kind) or part_of(kind, made, BASES.get(kind, ObjectivePart))
-    for kind, made in OBJECTIVES.items()
-}
+OBJECTIVE_PARTS: dict[str, type[ObjectivePart]] = OBJECTIVES.made(
+    lambda kind, made: SPECIAL.get(kind) or part_of(kind, made, BASES.get(kind, ObjectivePart))
+)
 
 #: One objective, a list that is added up, or nothing.
 ObjectiveList = Annotated[

@@ -18,7 +18,8 @@ from nmm.scenario.objectives import OBJECTIVE_PARTS, TermPart
 from nmm.scenario.resolvers import RESOLVER_PARTS
 from nmm.scenario.robot import ArmPart, MountedPart, RobotPart
 from nmm.scenario.scene import CarriedPart, ScenePart, SceneryPart
-from nmm.scenario.schema import PlanPart, ScenarioPart, TrackPart
+from nmm.scenario.schema import ScenarioPart, schema
+from nmm.scenario.sections import section_class, section_names
 from nmm.scenario.tasks import CONDITION_PARTS, TASK_PARTS
 
 YAML = {"None": "null", "True": "true", "False": "false"}
@@ -34,7 +35,7 @@ class Section(NamedTuple):
 
 def sections() -> Iterator[Section]:
     """The parts of a scenario, from the top; a reference that is a task's function too is listed once."""
-    yield _section("the file", ScenarioPart)
+    yield _section("the file", schema())
     yield _section("robot", RobotPart)
     yield _section("robot, with arms mounted", MountedPart)
     yield _section("robot.arms", ArmPart)
@@ -49,8 +50,7 @@ def sections() -> Iterator[Section]:
     yield _section("until", GoalPart)
     yield _section("disturbances", DisturbancesPart)
     yield _section("retreat", RetreatPart)
-    yield _section("plan", PlanPart)
-    yield _section("plan.track", TrackPart)
+    yield from _of_plugins()
     yield _section("limits", LimitsPart)
     yield _section("limits.bounds: a task's function and its keys, with these", BoundPart)
     yield _section("collisions", CollisionsPart)
@@ -60,6 +60,14 @@ def sections() -> Iterator[Section]:
     yield _section("scene", ScenePart)
     yield _section("scene.carried", CarriedPart)
     yield _section("scene.scenery", SceneryPart)
+
+
+def _of_plugins() -> Iterator[Section]:
+    for key, addition in section_names(ScenarioPart.model_fields).items():
+        if (section := section_class(addition)) is not None:
+            yield _section(key, section)
+            for place, part in section.listed.items():
+                yield _section(place, part)
 
 
 def _kinds(

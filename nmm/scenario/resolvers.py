@@ -71,10 +71,9 @@ SPELLED: dict[str, dict[str, Any]] = {
     }
 }
 BASES: dict[str, type[ResolverPart]] = {"ej": WithAddedTask}
-RESOLVER_PARTS: dict[str, type[ResolverPart]] = {
-    kind: part_of(kind, made, BASES.get(kind, ResolverPart), **SPELLED.get(kind, {}))
-    for kind, made in RESOLVERS.items()
-}
+RESOLVER_PARTS: dict[str, type[ResolverPart]] = RESOLVERS.made(
+    lambda kind, made: part_of(kind, made, BASES.get(kind, ResolverPart), **SPELLED.get(kind, {}))
+)
 
 
 class OwnPart(ResolverPart):

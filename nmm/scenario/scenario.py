@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from pydantic import ValidationError
 
@@ -19,13 +19,14 @@ from nmm.scenario.document import Document, read_file
 from nmm.scenario.keys import KeyedError, NamedReferences, as_written, at, first_error
 
 if TYPE_CHECKING:
+    from nmm import Plan
     from nmm.collisions.obstacle import Obstacle
     from nmm.control.controller import Controller
-    from nmm.plans.plan import Plan
     from nmm.resolvers.base import Resolver
     from nmm.robots.robot import Robot
     from nmm.runs.recording import Recorder
     from nmm.runs.trajectory import Trajectory
+    from nmm.scenario.sections import Motion
 
 SUFFIXES = (".yaml", ".yml")
 #: The kind of a resolver that is no kind of ours.
@@ -60,11 +61,11 @@ class Scenario:
         self.path = Path(document.name)
         own_name = re.sub(r"[^\w.-]", "_", self.path.name.split(".", 1)[0]) or "scenario"
         data = {"name": own_name, **document.data}
-        from nmm.scenario.schema import ScenarioPart
+        from nmm.scenario.schema import schema
 
         with self._located():
             try:
-                self.parts = ScenarioPart.model_validate(data, context=NamedReferences(data))
+                self.parts = schema(data).model_validate(data, context=NamedReferences(data))
             except ValidationError as error:
                 raise first_error(error, data) from None
         #: What is worth a warning of what was set, a sentence each.
@@ -141,7 +142,8 @@ class Scenario:
     @property
     def keys_of_a_run(self) -> tuple[str, ...]:
         """The keys that its controller does not depend on."""
-        return tuple(key for key in KEYS_OF_A_RUN if key != "q0" or self.parts.plan is None)
+        needed = {key for section in self.parts.sections().values() for key in section.needs}
+        return tuple(key for key in KEYS_OF_A_RUN if key not in needed)
 
     def robot(self) -> Robot:
         """The robot, loaded once."""
@@ -188,10 +190,15 @@ class Scenario:
         ScenarioError : as `controller`; a task whose target moves
         RunError : no way was found
         """
+        return cast("Plan", self._motion("plan", progress))
+
+    def _motion(self, section: str, progress: Progress | None) -> Motion:
+        from nmm.scenario.sections import Making
+
         robot = self.robot()
         with self._located():
             self.parts.check_start(robot)
-            return self.parts.build_plan(robot, self.absolute, progress)
+            return self.parts.motion(section, Making(self.parts, robot, self.absolute, progress))
 
     def run(
         self,
@@ -212,8 +219,8 @@ class Scenario:
         from nmm.runs.simulation import simulate
 
         parts = self.parts
-        if parts.is_plan:
-            return self._told(self.plan(progress).trajectory(parts.dt))
+        if parts.moved_by:
+            return self._told(self._motion(parts.moved_by, progress).trajectory(parts.dt))
         with self._located():
             if controller is None:
                 controller = self.controller()
@@ -236,7 +243,11 @@ class Scenario:
 
     def _told(self, trajectory: Trajectory) -> Trajectory:
         """A run with the scenario that it came from."""
+        from nmm.scenario.sections import findings_of
+
         warnings = [Finding("setting_parted", {"text": one}) for one in self.warnings]
+        for key, section in self.parts.sections().items():
+            warnings += findings_of(key, section, trajectory)
         return trajectory.with_scenario(self.resolved(), warnings, self.surroundings(self.robot()))
 
     def resolved(self) -> dict[str, Any]:

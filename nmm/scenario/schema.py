@@ -1,18 +1,20 @@
 """The keys of a scenario, from the top."""
 
-from collections.abc import Mapping
-from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+from collections.abc import Collection, Mapping
+from functools import cache
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, create_model
 
+from nmm.control.collisions import Collisions
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.sequence import Sequence
 from nmm.control.sequenced import SequencedController
-from nmm.errors import InputError, Setting, expect, few
+from nmm.errors import InputError, Setting, expect_known, few
 from nmm.functions.tasks.task import Stack
 from nmm.kinds import RESOLVERS
+from nmm.plugins import Addition
 from nmm.progress import Progress
 from nmm.resolvers.base import Resolver
 from nmm.robots.robot import Robot
@@ -22,19 +24,17 @@ from nmm.scenario.disturbances import DisturbancesPart
 from nmm.scenario.functions import REFERENCE_PARTS
 from nmm.scenario.keys import KeyedError, Part, at
 from nmm.scenario.limits import GoalPart, LimitsPart, RetreatPart, SteeringPart, part_or_none
-from nmm.scenario.numbers import Nested, Number, Positive, Whole, integer, numbers, numbers_by_name
+from nmm.scenario.numbers import Nested, Positive, integer, numbers, numbers_by_name
 from nmm.scenario.objectives import ObjectiveList, QuadraticPart, build_objective
 from nmm.scenario.resolvers import AnyResolver, WithAddedTask
 from nmm.scenario.robot import Absolute, RobotChoice
 from nmm.scenario.scene import ScenePart
+from nmm.scenario.sections import Making, Motion, Section, about, section_class, section_names
 from nmm.scenario.tasks import TASK_PARTS, TaskList, TaskPart, build_tasks, listed
 from nmm.text_format import listed as in_words
 
-if TYPE_CHECKING:
-    from nmm.plans.plan import Plan
 
-
-def _start(value: object) -> dict[str, Any] | list[Nested]:
+def start_of(value: object) -> dict[str, Any] | list[Nested]:
     """Numbers by name, one or several postures among them, or a list of numbers."""
     if not isinstance(value, Mapping):
         return numbers(value)
@@ -47,77 +47,6 @@ def _start(value: object) -> dict[str, Any] | list[Nested]:
     return {POSTURE: named, **numbers_by_name(rest)}
 
 
-def _goal(value: object) -> dict[str, Any]:
-    if not isinstance(value, Mapping):
-        raise InputError(expected="numbers by coordinate, as {x: 2, y: 1, theta: 0}", got=value)
-    return cast("dict[str, Any]", _start(value))
-
-
-Coordinates = Annotated[dict[str, Any], BeforeValidator(_goal)]
-
-
-class TrackPart(Part):
-    """The plan is the controller's task, with limits and distances as they are; `track: true` is this with
-    its defaults."""
-
-    gain: Positive = Field(2.0, description="feedback gain on the deviation in each input, 1/s")
-    length: Positive = Field(
-        0.4, description="about how far, m, a platform drives until it is back on its path"
-    )
-    pace: Positive = Field(
-        0.8,
-        description="share of the plan's speed, which leaves room for feedback",
-    )
-    margin: Annotated[Number, Field(ge=0.0)] = Field(
-        0.05,
-        description="m, how much farther than collisions.distance the plan stays, where it can",
-    )
-    tube: GoalPart = Field(
-        GoalPart.model_validate({"m": 0.1, "rad": 0.2}),
-        description="m and rad, how far from the plan the run warns, or plans again",
-    )
-    replan: bool = Field(
-        False,
-        description="whether it plans again beyond the tube",
-    )
-
-
-class PlanPart(Part):
-    """A motion to a goal that is searched, in place of the controller's; `plan: true` is this with its
-    defaults."""
-
-    to: Coordinates | None = Field(
-        None,
-        description="coordinates to be reached by name, m and rad (others are free), or posture: home of the "
-        "SRDF; by default the task's target",
-    )
-    through: list[Coordinates] = Field(default_factory=list, description="such goals on the way, in order")
-    seconds: Positive = Field(10.0, description="limit of the search, s")
-    seed: Annotated[Whole, Field(ge=0)] = Field(1, description="seed of the random numbers")
-    shorten: Whole = Field(200, description="how many shorter motions between two of its points are tried")
-    smooth: bool = Field(
-        False,
-        description="whether it goes on without rests, where such a motion is found",
-    )
-    objective: ObjectiveList = Field(
-        default_factory=list,
-        description="what a smooth plan minimises in its time, as the scenario's objective",
-    )
-    effort: bool | dict[str, Positive] = Field(
-        False,
-        description="whether motors keep the torque limits of the robot's file; or loads, kg by frame",
-    )
-    hold: str | None = Field(
-        None,
-        description="a frame that keeps its pose while the platform goes to x, y and theta of the goal",
-    )
-    track: Annotated[TrackPart | None, BeforeValidator(part_or_none)] = Field(
-        None,
-        description="true or a mapping for a controller that follows the plan; else the run is the "
-        "plan itself",
-    )
-
-
 class ScenarioPart(Part):
     """A scenario: robot, start, time, task, objective, resolver."""
 
@@ -128,7 +57,7 @@ class ScenarioPart(Part):
     robot: RobotChoice = Field(
         description="a name, a path, or a mapping with source, or with platform and arm (or arms)"
     )
-    q0: Annotated[dict[str, Any] | list[Nested], BeforeValidator(_start)] = Field(
+    q0: Annotated[dict[str, Any] | list[Nested], BeforeValidator(start_of)] = Field(
         description="configuration at t = 0, m and rad: a list in q's order, or by name (0 for the "
         "rest; posture: home takes one of the SRDF)"
     )
@@ -163,11 +92,6 @@ class ScenarioPart(Part):
     collisions: Annotated[CollisionsPart | None, BeforeValidator(part_or_none)] = Field(
         None, description="distances to keep: true for the robot to itself, or a mapping with obstacles"
     )
-    plan: Annotated[PlanPart | None, BeforeValidator(part_or_none)] = Field(
-        None,
-        description="true or a mapping for a planned motion to the goal; resolver and duration then "
-        "matter with plan.track alone",
-    )
     until: Annotated[GoalPart | None, BeforeValidator(part_or_none)] = Field(
         None, description="a target to reach: the run ends where the error is within tolerances"
     )
@@ -185,14 +109,54 @@ class ScenarioPart(Part):
         description="what else is drawn, and how the page opens",
     )
 
+    #: The keys that are sections of plugins.
+    section_keys: ClassVar[tuple[str, ...]] = ()
+
+    @classmethod
+    def known_keys(cls) -> Collection[str]:
+        return schema().model_fields
+
+    def sections(self) -> dict[str, Section]:
+        """The sections of plugins that the file has, by key."""
+        values = {key: getattr(self, key) for key in self.section_keys}
+        return {key: section for key, section in values.items() if section is not None}
+
+    def section(self, key: str) -> Section | None:
+        return self.sections().get(key)
+
     @property
-    def is_plan(self) -> bool:
-        """Whether a run is the planned motion itself."""
-        return self.plan is not None and self.plan.track is None
+    def moved_by(self) -> str:
+        """The section whose motion a run is, in place of the closed loop's; "" where there is none."""
+        return next((key for key, section in self.sections().items() if section.moves), "")
+
+    @property
+    def searches(self) -> bool:
+        """Whether making a controller takes seconds."""
+        return any(section.searches and not section.moves for section in self.sections().values())
 
     def goal(self) -> Goal | None:
         """The target at which a closed loop ends; one that follows a plan goes on for its duration."""
-        return None if self.until is None or self.plan is not None else self.until.make()
+        taken = any(section.takes_until for section in self.sections().values())
+        return None if self.until is None or taken else self.until.make()
+
+    def motion(self, key: str, making: Making) -> Motion:
+        """The motion of a section, or of the section with its defaults; `RunError` where there is none."""
+        section = self.section(key)
+        if section is None:
+            known = section_names(ScenarioPart.model_fields)
+            expect_known("section", key, known)
+            kind = section_class(known[key])
+            if kind is None:
+                raise InputError(f"section {key} cannot be imported")
+            section = kind.model_validate({})
+        with about(key):
+            return section.motion(making)
+
+    def build_collisions(self, robot: Robot, absolute: Absolute) -> Collisions | None:
+        with at("collisions"):
+            return (
+                None if self.collisions is None else self.collisions.build(robot, absolute, ("collisions",))
+            )
 
     def build(
         self,
@@ -206,18 +170,11 @@ class ScenarioPart(Part):
         self.check_start(robot)
         with at("task"):
             task = build_tasks(self.task, robot)
-        if self.plan is not None and (track := self.plan.track) is not None:
-            from nmm.plans.replan import replan
-
-            plan = self.build_plan(robot, absolute, progress)
-            anew = partial(replan, **self.plan.given("seconds", "seed")) if track.replan else None
-            given = track.given("gain", "length", "pace")
-            task = [plan.reference(**given, tube=track.tube.make(), replan=anew)]
-            with at("duration"):
-                least = plan.duration / track.pace
-                expect(
-                    self.duration >= least, "", f"at least {least:.4g} s, which the plan takes", self.duration
-                )
+        making = Making(self, robot, absolute, progress)
+        for key, section in self.sections().items():
+            with about(key):
+                section.check(making)
+                task = section.tasks(making, task)
         with at("resolver"):
             resolver = own or self.resolver.make()
         with at("task"):
@@ -232,9 +189,7 @@ class ScenarioPart(Part):
                 raise InputError(expected=expected, got=first)
         with at("limits"):
             limits = None if self.limits is None else self.limits.build(robot)
-        with at("collisions"):
-            place = ("collisions",)
-            collisions = None if self.collisions is None else self.collisions.build(robot, absolute, place)
+        collisions = self.build_collisions(robot, absolute)
         with at("objective"):
             objective = build_objective(self.objective, robot, collisions)
         with at("retreat"):
@@ -262,39 +217,6 @@ class ScenarioPart(Part):
                     self._check_added(robot, rows, robot.n_u - s, held)
             with self.resolver.own_keys():
                 return Controller(robot, task, resolver, objective, added, *rest, collisions, **second)
-
-    def build_plan(self, robot: Robot, absolute: Absolute, progress: Progress | None) -> "Plan":
-        """The planned motion; `RunError` where none is found."""
-        from nmm.plans.planned import plan
-
-        part = self.plan or PlanPart.model_validate({})
-        goals = [part.to, *part.through]
-        for k, one in enumerate(goals):
-            with at("plan"), at(*(("to",) if k == 0 else ("through", k - 1))):
-                robot.q(one)
-        goal: Any = part.to
-        if goal is None:
-            with at("task"):
-                stack = build_tasks(self.task, robot)
-                if len(stack) > 1 or any(one.when for one in stack):
-                    raise InputError(expected="one task, as its target is the plan's goal; or plan.to")
-                goal = stack[0]
-        with at("collisions"):
-            place = ("collisions",)
-            collisions = None if self.collisions is None else self.collisions.build(robot, absolute, place)
-        with at("plan"), at("objective"):
-            objective = build_objective(part.objective, robot, collisions)
-        limits = None if self.limits is None else self.limits.build(robot)
-        tolerance = None if self.until is None else self.until.make()
-        given = part.given("through", "seconds", "seed", "shorten", "smooth", "effort", "hold")
-        given |= {"limits": limits, "tolerance": tolerance, "objective": objective, "progress": progress}
-        if part.track is not None:
-            given["margin"] = part.track.margin
-        with at("plan"):
-            try:
-                return plan(robot, robot.q(self.q0), goal, collisions=collisions, **given)
-            except InputError as error:
-                raise error.placed(error.where.removeprefix("plan: ")) from None
 
     def check_start(self, robot: Robot) -> None:
         """`KeyedError` for a q0 that is none of the robot's, or outside limits that are not kept."""
@@ -353,3 +275,37 @@ def _kind_first(value: Any) -> Any:
         ordered = sorted(value.items(), key=lambda item: item[0] != "kind")
         return {key: _kind_first(item) for key, item in ordered}
     return [_kind_first(item) for item in value] if isinstance(value, list) else value
+
+
+def schema(data: Mapping[str, object] | None = None) -> type[ScenarioPart]:
+    """The keys of a file with these data: nmm's, shipped plugins' and strangers' that the data have; without
+    data those of all plugins."""
+    core = ScenarioPart.model_fields
+    shipped = section_names(core, foreign=False)
+    if data is None:
+        return _with_sections(tuple(section_names(core).items()))
+    if all(key in core or key in shipped for key in data):
+        return _with_sections(tuple(shipped.items()))
+    every = section_names(core)
+    return _with_sections(tuple((key, every[key]) for key in every if key in shipped or key in data))
+
+
+@cache
+def _with_sections(names: tuple[tuple[str, Addition], ...]) -> type[ScenarioPart]:
+    kinds = {key: kind for key, addition in names if (kind := section_class(addition)) is not None}
+    parts: dict[str, Any] = {
+        key: (
+            Annotated[kind | None, BeforeValidator(part_or_none)],
+            Field(None, description=kind.summary),
+        )
+        for key, kind in kinds.items()
+    }
+    whole = create_model("ScenarioPart", __base__=ScenarioPart, __doc__=ScenarioPart.__doc__, **parts)
+    whole.section_keys = tuple(kinds)
+    order = list(ScenarioPart.model_fields)
+    for key, kind in kinds.items():
+        order.insert(order.index(kind.after) + 1 if kind.after in order else len(order), key)
+    fields = {key: whole.model_fields[key] for key in order}
+    whole.model_fields.clear()  # not yet in use: its schema is built when it first reads a file
+    whole.model_fields.update(fields)
+    return whole

@@ -1,6 +1,5 @@
 """Sweeps: many rollouts of a scenario over ranges of its keys, on one machine or a Dask cluster."""
 
-from nmm.sweeps.result import SweepResult
-from nmm.sweeps.sweep import Sweep
+import lazy_loader
 
-__all__ = ["Sweep", "SweepResult"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

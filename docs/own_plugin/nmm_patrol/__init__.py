@@ -1,0 +1,1 @@
+"""Rounds from place to place: a plugin of nmm."""

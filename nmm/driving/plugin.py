@@ -1,0 +1,9 @@
+"""The plugin with live pages: runs played, robots seen and driven in a browser, and videos."""
+
+from nmm.plugins import Plugin
+
+PLUGIN = Plugin(
+    "live",
+    commands={name: f"nmm.cli.playing:{name}" for name in ("play", "render", "view", "drive")},
+    after={"play": "paper", "render": "play", "view": "check", "drive": "view"},
+)

@@ -1,0 +1,2 @@
+from .result import SweepResult as SweepResult
+from .sweep import Sweep as Sweep

@@ -1,0 +1,10 @@
+"""The plugin for sweeps: a scenario run many times, over ranges of its keys."""
+
+from nmm.plugins import Plugin
+
+PLUGIN = Plugin(
+    "sweeps",
+    commands={"sweep": "nmm.cli.sweeping:sweep"},
+    after={"sweep": "torques"},
+    folders={"sweep": "nmm.sweeps.folder:is_sweep"},
+)
