@@ -1,6 +1,5 @@
 """What authors of platforms, tasks, resolvers and of packages above the wall need beside `nmm` itself."""
 
-from .cli.groups import OptionGroup as OptionGroup
 from .collisions import Shape as Shape
 from .collisions.obstacle import obstacle_as_json as obstacle_as_json
 from .collisions.obstacle import obstacle_from_json as obstacle_from_json
@@ -116,6 +115,7 @@ from .platforms.wheel_layout import Pivot as Pivot
 from .platforms.wheel_layout import RollingJoint as RollingJoint
 from .platforms.wheeled.descriptions import WheelDescription as WheelDescription
 from .platforms.wheeled.platform import WheelRate as WheelRate
+from .plugins import OptionGroup as OptionGroup
 from .plugins import Plugin as Plugin
 from .resolvers import Dimensions as Dimensions
 from .resolvers import Resolver as Resolver

@@ -12,10 +12,9 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.metadata import entry_points
 from pkgutil import resolve_name
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from nmm.errors import InputError, expect, expect_kind, expect_known
 from nmm.text_format import one_line
@@ -95,6 +94,27 @@ def _checked(entry: object, where: str) -> str:
     return str(entry)
 
 
+class OptionGroup:
+    """Options that a plugin adds to a command: a dataclass, each field's default a `typer.Option`."""
+
+    #: The options that ask for its answer in place of the command's: "--search".
+    answers: ClassVar[tuple[str, ...]] = ()
+
+    def asked(self) -> str:
+        """The option that asks for its answer; "" where none was used."""
+        return ""
+
+    def check(self) -> None:
+        """`InputError` for options that do not go together."""
+
+    def refuse(self) -> None:
+        """`InputError` for an option that was used where the command has nothing that it is of."""
+
+    def answer(self, *subject: Any) -> int | None:
+        """Answer for what the command is about: its exit status; None where the command goes on."""
+        return None
+
+
 class Addition(NamedTuple):
     """What a plugin adds by one name."""
 
@@ -126,11 +146,26 @@ def shipped_plugins() -> tuple[Plugin, ...]:
     return tuple(_described((entry, entry) for entry in SHIPPED))
 
 
-@cache
 def foreign_plugins() -> tuple[Plugin, ...]:
-    """Strangers' plugins, in the order of their entry points' names."""
+    """Strangers' plugins, in the order of their entry points' names; none for a module of theirs that asks
+    while it is imported."""
+    return () if _reading else _foreign_plugins()
+
+
+#: Something is in it while strangers' descriptions are imported.
+_reading: list[str] = []
+
+
+@cache
+def _foreign_plugins() -> tuple[Plugin, ...]:
+    from importlib.metadata import entry_points  # here: most starts do without
+
     points = sorted({(point.name, point.value) for point in entry_points(group=GROUP)})
-    return tuple(_described(points, {plugin.name for plugin in shipped_plugins()}))
+    _reading.append(GROUP)
+    try:
+        return tuple(_described(points, {plugin.name for plugin in shipped_plugins()}))
+    finally:
+        _reading.clear()
 
 
 def _described(points: Iterable[tuple[str, str]], names: Collection[str] = ()) -> Iterator[Plugin]:

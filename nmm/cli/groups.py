@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import Field, dataclass, fields, is_dataclass
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_origin, get_type_hints
 
 import typer
 from typer.models import ParameterInfo
@@ -26,33 +26,12 @@ from nmm.cli.options import (
 )
 from nmm.errors import InputError, expect_known
 from nmm.kinds import PLATFORMS
-from nmm.plugins import complain, groups_of_options
+from nmm.plugins import OptionGroup, complain, groups_of_options
 from nmm.text_format import listed
 
 if TYPE_CHECKING:
     from nmm.ellipsoid_options import Wanted
     from nmm.figure_options import FigureOptions
-
-
-class OptionGroup:
-    """Options that a plugin adds to a command: a dataclass, each field's default a `typer.Option`."""
-
-    #: The options that ask for its answer in place of the command's: "--search".
-    answers: ClassVar[tuple[str, ...]] = ()
-
-    def asked(self) -> str:
-        """The option that asks for its answer; "" where none was used."""
-        return ""
-
-    def check(self) -> None:
-        """`InputError` for options that do not go together."""
-
-    def refuse(self) -> None:
-        """`InputError` for an option that was used where the command has nothing that it is of."""
-
-    def answer(self, *subject: Any) -> int | None:
-        """Answer for what the command is about: its exit status; None where the command goes on."""
-        return None
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from nmm.cli.groups import OptionGroup
 from nmm.cli.options import flag, option
 from nmm.cli.output import OK, progress, show_table, show_text
 from nmm.errors import InputError, expect
+from nmm.plugins import OptionGroup
 from nmm.text_format import listed, value_text
 
 if TYPE_CHECKING:

@@ -12,7 +12,6 @@ from pydantic import ValidationError
 
 from nmm.errors import ScenarioError, no_such
 from nmm.findings import Finding
-from nmm.kinds import RESOLVERS
 from nmm.progress import Progress
 from nmm.robots.surroundings import Surroundings
 from nmm.scenario.document import Document, read_file
@@ -278,10 +277,12 @@ class Scenario:
 
 def _with_settings(document: Document, settings: Mapping[str, object]) -> Document:
     kind = settings.get("resolver.kind")
-    if not (isinstance(kind, str) and kind in RESOLVERS):
+    if not isinstance(kind, str):
         return document.with_settings(settings)
     from nmm.scenario.resolvers import RESOLVER_PARTS
 
+    if kind not in RESOLVER_PARTS:
+        return document.with_settings(settings)
     keys = [*settings]
     first = keys.index("resolver.kind") + 1  # what is set after it has to be known to the new kind
     document = document.with_settings({key: settings[key] for key in keys[:first]})

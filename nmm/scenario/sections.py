@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -93,8 +94,7 @@ def findings_of(key: str, section: Section, run: Trajectory) -> list[Finding]:
     """What a section warns of after a run; none, and a line of the log, where its method fails."""
     try:
         findings = list(section.findings(run))
-        for finding in findings:
-            str(finding)  # its code has words
+        json.dumps([finding.as_json() for finding in findings])  # as a folder will; codes have words
     except Exception as error:  # the run is there, whatever a stranger's method does with it
         complain(key, f"findings: {type(error).__name__}: {error}; they are left out")
         return []

@@ -37,11 +37,12 @@ class Patrol(Section):
         return [nmm.Task(nmm.Position(self.frame, "xy"), round_trip, gain=2.0)]
 
     def findings(self, run: nmm.Trajectory) -> list[nmm.Finding]:
-        visited = sum(t <= run.t[-1] for t in self.times)
+        end = float(run.t[-1])
+        visited = sum(t <= end for t in self.times)
         if visited == len(self.places):
             return []
         values = {"visited": visited, "places": len(self.places), "needed": self.times[-1]}
-        return [nmm.Finding("patrol_unfinished", values, {"t": float(run.t[-1])})]
+        return [nmm.Finding("patrol_unfinished", values, {"t": end})]
 
 
 def least_norm(problem: nmm.Problem) -> np.ndarray:

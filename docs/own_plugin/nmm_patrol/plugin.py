@@ -16,7 +16,9 @@ PLUGIN = Plugin(
 )
 
 WORDS = {
-    "patrol_unfinished": "at t = {t:.4g} s the patrol ends, after {visited} of {places} places: it takes {needed:g} s"
+    "patrol_unfinished": (
+        "at t = {t:.4g} s the patrol ends, after {visited} of {places} places: it takes {needed:g} s"
+    )
 }
 
 
