@@ -1,14 +1,12 @@
 """nmm: modelling and redundancy resolution for nonholonomic mobile manipulators, on Pinocchio.
 
-Names are loaded when first used, so that `import nmm` costs nothing (`lazy_loader`; the list of
-names is `__init__.pyi`).
+Names are loaded when first used, so that `import nmm` costs nothing (the list is `__init__.pyi`).
 """
 
 from importlib.util import find_spec
 
-import lazy_loader
-
 from nmm.lazy_call import interrupts_wait
+from nmm.lazy_names import attach
 from nmm.version import __version__ as __version__
 
 #: Names that authors need, which were in front before.
@@ -37,7 +35,7 @@ MOVED = {name: f"extending.{name}" for name in _EXTENDING.split()} | {
     "WeighedManipulability": "WeightedManipulability",
 }
 
-_loaded, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+_loaded, __dir__, __all__ = attach(__name__, __file__)
 
 
 def __getattr__(name: str) -> object:

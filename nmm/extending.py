@@ -4,22 +4,6 @@ The list of names is `extending.pyi`; docs/api/extending.md says what they are. 
 first used.
 """
 
-import re
-from importlib import import_module
-from pathlib import Path
-from typing import Any
+from nmm.lazy_names import attach
 
-_STUB = Path(__file__).with_suffix(".pyi").read_text("utf-8")
-_HOMES = {name: home for home, name in re.findall(r"^from (\S+) import \w+ as (\w+)$", _STUB, re.M)}
-__all__ = tuple(_HOMES)
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"nmm.extending has no {name}")
-    found = globals()[name] = getattr(import_module(_HOMES[name], "nmm"), name)
-    return found
-
-
-def __dir__() -> list[str]:
-    return [*_HOMES]
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

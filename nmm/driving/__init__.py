@@ -1,5 +1,5 @@
 """A robot that follows a target moved live: what `nmm drive` shows."""
 
-import lazy_loader
+from nmm.lazy_names import attach
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -1,5 +1,5 @@
 """Videos of runs: the playback page, picture by picture, through a headless Chromium and ffmpeg."""
 
-import lazy_loader
+from nmm.lazy_names import attach
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

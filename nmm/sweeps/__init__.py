@@ -1,5 +1,5 @@
 """Sweeps: many rollouts of a scenario over ranges of its keys, on one machine or a Dask cluster."""
 
-import lazy_loader
+from nmm.lazy_names import attach
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

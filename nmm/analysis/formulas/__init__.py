@@ -1,5 +1,5 @@
 """f, J and its minors as formulas, and what follows from them: where J loses rank, and where it cannot."""
 
-import lazy_loader
+from nmm.lazy_names import attach
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -1,0 +1,34 @@
+"""Names of a package that are loaded when first used, from its stub, which type checkers read, too."""
+
+import re
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+Names = tuple[str, ...]
+
+_LINE = re.compile(r"^from (\S+) import (\w+) as \2$", re.M)
+
+
+def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], Names]:
+    """`__getattr__`, `__dir__` and `__all__` of the module `package` at `file`, from the stub beside it.
+
+    Each line of the stub is `from MODULE import NAME as NAME`, MODULE absolute or relative to the package.
+    """
+    stub = Path(file).with_suffix(".pyi").read_text("utf-8")
+    modules = {name: module for module, name in _LINE.findall(stub)}
+    parent = package if Path(file).stem == "__init__" else package.rpartition(".")[0]
+
+    def load(name: str) -> Any:
+        if name not in modules:
+            raise AttributeError(f"{package} has no {name}", name=name, obj=sys.modules[package])
+        module = modules[name]
+        if module == ".":
+            value = import_module(f".{name}", parent)
+        else:
+            value = getattr(import_module(module, parent), name)
+        return sys.modules[package].__dict__.setdefault(name, value)
+
+    return load, lambda: [*modules], tuple(modules)
