@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import nmm
-from nmm.bundled import bundled_scenarios
+from nmm.base.bundled import bundled_scenarios
 from nmm.rendering.chromium import NAMES
 
 if TYPE_CHECKING:

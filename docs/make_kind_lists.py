@@ -1,4 +1,4 @@
-"""Write what follows from nmm/kinds.py: `python docs/make_kind_lists.py`.
+"""Write what follows from nmm/base/kinds.py: `python docs/make_kind_lists.py`.
 
 A class that is registered there gets its line in nmm/__init__.pyi, which makes it `nmm.Name`, its entry on
 the page of docs/api about such classes, and its section in docs/scenarios.md. docs/api/index.md lists the
@@ -11,7 +11,7 @@ import re
 import sys
 from pathlib import Path
 
-from nmm.kinds import OBJECTIVES, PLATFORMS, REFERENCES, RESOLVERS, TASKS, Kinds
+from nmm.base.kinds import OBJECTIVES, PLATFORMS, REFERENCES, RESOLVERS, TASKS, Kinds
 
 ROOT = Path(__file__).resolve().parent.parent
 STUB = ROOT / "nmm" / "__init__.pyi"

@@ -23,7 +23,7 @@ from make_gallery import save_small
 from PIL import Image
 
 import nmm
-from nmm.errors import expect_known
+from nmm.base.errors import expect_known
 from nmm.figures import overview, save
 from nmm.playback import write_html
 from nmm.rendering.chromium import HeadlessPage

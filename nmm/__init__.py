@@ -5,9 +5,9 @@ Names are loaded when first used, so that `import nmm` costs nothing (the list i
 
 from importlib.util import find_spec
 
-from nmm.lazy_call import interrupts_wait
-from nmm.lazy_names import attach
-from nmm.version import __version__ as __version__
+from nmm.base.lazy_call import interrupts_wait
+from nmm.base.lazy_names import attach
+from nmm.base.version import __version__ as __version__
 
 #: Names that authors need, which were in front before.
 _EXTENDING = """
@@ -54,7 +54,7 @@ def _of_plugins(name: str) -> object:
     """What a stranger's plugin adds by this name; None where none does, and for nmm's own modules."""
     if name.startswith("_") or find_spec(f"nmm.{name}") is not None:
         return None
-    from nmm.plugins import additions
+    from nmm.base.plugins import additions
 
     addition = additions("front", (*__all__, *MOVED)).get(name)
     return None if addition is None else addition.load()

@@ -4,6 +4,6 @@ The list of names is `extending.pyi`; docs/api/extending.md says what they are. 
 first used.
 """
 
-from nmm.lazy_names import attach
+from nmm.base.lazy_names import attach
 
 __getattr__, __dir__, __all__ = attach(__name__, __file__)

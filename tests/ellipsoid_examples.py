@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 import nmm
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 

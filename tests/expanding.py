@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from xml.etree import ElementTree
 
-from nmm.bundled import bundled_robots
+from nmm.base.bundled import bundled_robots
 from nmm.robots.loading.description import expand
 from nmm.robots.loading.packages import Packages
 

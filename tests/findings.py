@@ -11,7 +11,7 @@ import pytest
 
 import nmm
 from nmm import Finding
-from nmm.errors import InputError, NmmError, RobotError
+from nmm.base.errors import InputError, NmmError, RobotError
 
 #: A code, with some of the values and of where.
 Expected = tuple[str, Mapping[str, Any]]

@@ -15,7 +15,7 @@ from scipy.linalg import null_space
 from scipy.optimize import linprog
 
 import nmm
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.resolvers.problem import Problem
 
 #: (rows of each level, inputs, rows of limits)

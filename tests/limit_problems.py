@@ -17,7 +17,7 @@ import daqp
 import numpy as np
 from scipy.optimize import linprog, nnls
 
-from nmm.kernels.active_set import Rows, nearest_within
+from nmm.base.kernels.active_set import Rows, nearest_within
 
 #: Rows of the task, inputs, rows of limits.
 SIZES = ((2, 4, 4), (3, 5, 5), (6, 10, 10), (6, 10, 18), (6, 18, 40))

@@ -16,8 +16,8 @@ import numpy as np
 from wandering import beyond
 
 import nmm
+from nmm.base.text_format import listed
 from nmm.robots.zero_order_hold import HeldInputs
-from nmm.text_format import listed
 
 PERIOD = 0.01
 #: When the fault begins, s: the robot moves.

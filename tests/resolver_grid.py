@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 
-from nmm.kinds import RESOLVERS
+from nmm.base.kinds import RESOLVERS
 from nmm.resolvers import Resolver
 
 

@@ -17,7 +17,7 @@ import numpy as np
 import pinocchio as pin
 
 import nmm
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 
 #: A scenario that has the robot and where it starts, and the frame that moves.
 ROBOTS = {

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from paper_cases import CASES
 
 from nmm.analysis import analyse, analyse_along
+from nmm.base.errors import InputError
 from nmm.control.controller import Controller
-from nmm.errors import InputError
 from nmm.functions.tasks import Position
 from nmm.resolvers import ProjectedGradient
 from nmm.robots.loading import load

@@ -10,13 +10,13 @@ import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 
-from nmm import cores
 from nmm.analysis.maps.reach import Reach
 from nmm.analysis.maps.search import Grid, Layer
 from nmm.analysis.maps.workspace import workspace_map
 from nmm.analysis.singular.jacobians import Jacobians
+from nmm.base import cores
+from nmm.base.kernels.spectra import FEW_ROWS, SIDE_BY_SIDE, spectra, write_spectrum
 from nmm.functions.tasks import CallableFunction, Pose, Position
-from nmm.kernels.spectra import FEW_ROWS, SIDE_BY_SIDE, spectra, write_spectrum
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 

@@ -13,7 +13,7 @@ import pytest
 from nmm.analysis.maps.coordinates import singularity_map
 from nmm.analysis.maps.singular_set import SingularSet
 from nmm.analysis.maps.workspace import workspace_map
-from nmm.errors import InputError
+from nmm.base.errors import InputError
 from nmm.figures.maps import thinned
 from nmm.folders.map import is_map
 from nmm.functions.tasks import Heading, Position

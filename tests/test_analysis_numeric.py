@@ -14,9 +14,9 @@ from numpy import cos, pi, sin
 from numpy.typing import NDArray
 
 from nmm.analysis import SingularityReport, analyse
+from nmm.base.errors import InputError, SingularError
 from nmm.control.controller import Controller
 from nmm.control.directions import direction_text, readable_basis
-from nmm.errors import InputError, SingularError
 from nmm.functions.tasks import LinearCoordinates, Pose, Position, Task
 from nmm.resolvers import ReducedGradient
 from nmm.robots.loading import load, mount

@@ -12,8 +12,8 @@ from robot_grid import built, frame_of, start
 from nmm.analysis.redundancy.null_fields import readable_null_space
 from nmm.analysis.redundancy.report import RedundancyReport, redundancy
 from nmm.analysis.singular.parts import null_space
+from nmm.base.errors import InputError, SingularError
 from nmm.control.controller import Controller
-from nmm.errors import InputError, SingularError
 from nmm.functions.function import Function
 from nmm.functions.references import Bearing
 from nmm.functions.tasks import Heading, Pose, Position, Task

@@ -17,7 +17,7 @@ from nmm.analysis import analyse
 from nmm.analysis.search.family import SingularFamily
 from nmm.analysis.search.many_starts import SingularitySearch, find_singularities
 from nmm.analysis.search.nearest import nearest_singularity
-from nmm.errors import InputError, SingularError
+from nmm.base.errors import InputError, SingularError
 from nmm.functions.tasks import CallableFunction, Heading, Pose, Position, Posture
 from nmm.robots.loading import load
 from nmm.robots.robot import Robot

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from nmm.analysis.search.family import values_text
 from nmm.analysis.search.many_starts import find_singularities
 from nmm.analysis.search.nearest import nearest_singularity
+from nmm.base.text_format import value_text
 from nmm.cli.singularity_options import search_command, show_nearest, show_search
 from nmm.cli.subjects import studied
 from nmm.functions.tasks import CallableFunction, Position
 from nmm.robots.loading import load
 from nmm.robots.robot import Robot
-from nmm.text_format import value_text
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from nmm.analysis import analyse
 from nmm.analysis.singular.jacobians import Jacobians
-from nmm.errors import InputError
+from nmm.base.errors import InputError
 from nmm.functions.program import evaluate
 from nmm.functions.tasks import Heading, Orientation, Pose, Position, Task
 from nmm.robots.configuration import Configuration

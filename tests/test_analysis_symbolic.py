@@ -15,7 +15,7 @@ from symbolic_checks import PAPER, TASKS, TIP, check_numbers, made, minors_of
 from nmm.analysis.formulas import symbolic
 from nmm.analysis.formulas.expressions import shown
 from nmm.analysis.formulas.symbolic_analysis import latex_lines
-from nmm.errors import InputError
+from nmm.base.errors import InputError
 from nmm.functions.tasks import Distance, Orientation, Pointing, Position
 from nmm.platforms import DifferentialDrive
 from nmm.robots.loading import load

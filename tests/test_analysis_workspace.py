@@ -16,7 +16,7 @@ from nmm.analysis.maps.result import Map
 from nmm.analysis.maps.search import BENT
 from nmm.analysis.maps.workspace import in_curves, workspace_map
 from nmm.analysis.singular.jacobians import Jacobians
-from nmm.errors import InputError
+from nmm.base.errors import InputError
 from nmm.functions.tasks import Position
 from nmm.robots.configuration import Configuration
 from nmm.robots.loading import load

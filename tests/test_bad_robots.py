@@ -14,14 +14,14 @@ from findings import assert_found, holds
 from urdf_parts import AXIS, LIMIT, inertial, joint, link, robot, shape, write
 
 from nmm import Finding
-from nmm.bundled import bundled_robots
-from nmm.errors import RobotError
+from nmm.base.bundled import bundled_robots
+from nmm.base.errors import RobotError
+from nmm.base.text_format import printable, short_words
 from nmm.robots.loading import load
 from nmm.robots.loading.check import inspect
 from nmm.robots.loading.check_parts import MESH_SUFFIXES, FindMesh
 from nmm.robots.loading.report import file_report
 from nmm.robots.robot import Robot
-from nmm.text_format import printable, short_words
 
 pytestmark = pytest.mark.usefixtures("xacro_each_time")
 

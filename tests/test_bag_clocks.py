@@ -13,8 +13,8 @@ from findings import of_code, the
 from robot_logs import FIRST, STORE, Sent, bag, bag_of_ros1, joints, odom, tf, transform, wheeled
 
 import nmm
+from nmm.base.errors import InputError
 from nmm.cli.exit_status import status_of
-from nmm.errors import InputError
 from nmm.findings import bag as bag_words
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*:RuntimeWarning")

@@ -14,7 +14,7 @@ from findings import codes, of_code, the
 from robot_logs import CAMERA, Sent, bag, joints, odom, tf, transform, wheeled
 
 import nmm
-from nmm.errors import InputError
+from nmm.base.errors import InputError
 
 ARM = {"j1": 0.1, "j2": 0.2}
 pytestmark = pytest.mark.filterwarnings("ignore:.*:RuntimeWarning")

@@ -15,9 +15,9 @@ import pinocchio as pin
 import pytest
 
 import nmm
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError
 from nmm.cli.exit_status import status_of
-from nmm.errors import InputError
 from nmm.robots.robot import Robot
 
 rosbag2 = pytest.importorskip("rosbags.rosbag2")

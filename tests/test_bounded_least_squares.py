@@ -13,7 +13,7 @@ from findings import the
 from numpy.typing import NDArray
 
 import nmm
-from nmm.kernels.record_layout import Memory, views
+from nmm.base.kernels.record_layout import Memory, views
 from nmm.resolvers.answer import Answer, AnswerArrays, unanswered
 from nmm.resolvers.base import ANSWER, resolve_one
 from nmm.resolvers.problem import Problem

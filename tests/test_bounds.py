@@ -12,12 +12,12 @@ import pytest
 from findings import refused
 
 import nmm
-from nmm import machine
 from nmm.analysis.redundancy.moving import self_motion
+from nmm.base import machine
+from nmm.base.errors import RunError
 from nmm.cli.exit_status import status_of
 from nmm.control import integrators
 from nmm.control.integrators import Adaptive
-from nmm.errors import RunError
 
 ROBOT = '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro">{}<link name="base_link"/></robot>'
 

@@ -16,7 +16,7 @@ import nmm.functions.tasks
 import nmm.resolvers
 from nmm import Scenario
 from nmm.analysis import analyse_along
-from nmm.bundled import bundled_scenarios
+from nmm.base.bundled import bundled_scenarios
 
 PI = math.pi
 PAPER = ("unicycle_2r_position", "unicycle_2r_pointing", "unicycle_2r_link_pointing", "unicycle_3r_position")

@@ -11,7 +11,7 @@ import pytest
 from figure_examples import cut, run
 from playback_robot import drive, hand_built_robot
 
-from nmm.errors import InputError
+from nmm.base.errors import InputError
 from nmm.playback import write_html
 from nmm.playback.channels import FPS, SEEN, Channel, channels
 from nmm.playback.keyframes import MOST_FRAMES

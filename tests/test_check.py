@@ -17,10 +17,10 @@ from urdf_parts import AXIS, inertial, joint, link, robot, shape, write
 
 import nmm
 from nmm import Finding
-from nmm.bundled import bundled_robots
+from nmm.base.bundled import bundled_robots
+from nmm.base.errors import RobotError
 from nmm.cli.exit_status import status_of
 from nmm.collisions.pairs import SAMPLES, link_names, query_shapes, touching, touching_links
-from nmm.errors import RobotError
 from nmm.robots.loading.packages import package_file
 from nmm.robots.loading.report import FileReport, file_report
 

@@ -8,8 +8,8 @@ from findings import refused
 
 import nmm
 from nmm import Scenario
+from nmm.base.errors import ScenarioError
 from nmm.collisions.pairs import random_configurations
-from nmm.errors import ScenarioError
 from nmm.functions.program import Program
 from nmm.robots.configuration import Configuration
 from nmm.robots.zero_order_hold import HeldInputs, RollingPreview

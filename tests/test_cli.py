@@ -15,9 +15,9 @@ from command_line import Result, Terminal, imported, process
 from ports import MOST
 
 import nmm
-from nmm import kinds
 from nmm.analysis.maps.measures import MEASURES
-from nmm.bundled import bundled_robots, bundled_scenarios
+from nmm.base import kinds
+from nmm.base.bundled import bundled_robots, bundled_scenarios
 from nmm.cli.exit_status import status_of
 
 Command = Callable[..., Result]

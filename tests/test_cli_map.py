@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from small_pictures import draw_only
 
+from nmm.base.errors import InputError
 from nmm.cli.exit_status import status_of
 from nmm.cli.mapping import map_measures
-from nmm.errors import InputError
 from nmm.robots.configuration import Configuration
 from nmm.robots.loading import load
 

@@ -17,8 +17,8 @@ import nmm
 import nmm.cli.redundancy
 from nmm.analysis.redundancy.moving import self_motion
 from nmm.analysis.redundancy.report import redundancy as report_of
+from nmm.base.errors import InputError, SingularError
 from nmm.cli.redundancy import direction_of, laps, redundancy
-from nmm.errors import InputError, SingularError
 from nmm.functions.tasks import Position
 
 BENT = ["theta=0.3", "q1=0.4", "q2=0.7"]

@@ -14,7 +14,7 @@ from ports import listening
 from urdf_parts import AXIS, LIMIT, inertial, joint, link, robot, shape, write
 
 import nmm
-from nmm.bundled import bundled_robots
+from nmm.base.bundled import bundled_robots
 from nmm.cli.exit_status import status_of
 from nmm.control.idle_inputs import inputs_without_effect
 

@@ -22,11 +22,11 @@ from small_pictures import draw_only
 
 import nmm
 import nmm.cli.runs
+from nmm.base.figure_options import FigureOptions
 from nmm.cli.exit_status import status_of
 from nmm.cli.options import chosen, named
 from nmm.cli.playing import runs_in
 from nmm.cli.runs import run as run_scenario
-from nmm.figure_options import FigureOptions
 from nmm.tables import Table
 
 SHORT = ("--set", "duration=0.5")

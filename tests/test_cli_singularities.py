@@ -18,8 +18,8 @@ from small_pictures import draw_only
 
 from nmm import Scenario
 from nmm.analysis import analyse, analyse_along
+from nmm.base.findings import Finding
 from nmm.cli.exit_status import status_of
-from nmm.findings import Finding
 from nmm.functions.tasks import Heading, Position
 from nmm.robots.loading import load
 from nmm.runs.trajectory import Trajectory

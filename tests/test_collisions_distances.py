@@ -5,9 +5,9 @@ import pinocchio as pin
 import pytest
 
 import nmm
+from nmm.base.kernels.record_layout import Memory, views
 from nmm.collisions.pairs import random_configurations
 from nmm.collisions.rows import Rows, no_rows
-from nmm.kernels.record_layout import Memory, views
 
 
 def rows_at(setting, t, q, most=60):

@@ -12,7 +12,7 @@ from urdf_parts import inertial, joint, link, robot, shape, write
 
 import nmm
 from nmm import Scenario
-from nmm.errors import ScenarioError
+from nmm.base.errors import ScenarioError
 
 TEXT = """
 robot: unicycle_3r

@@ -20,6 +20,9 @@ from numpy.typing import NDArray
 from paper_cases import CASES, TIP
 from platform_grid import EXAMPLES, random_qp
 
+from nmm.base.kernels.compiled import Kernel
+from nmm.base.kernels.record_layout import Memory, views
+from nmm.base.kernels.records import At, Frames, Rows
 from nmm.control.controller import Controller
 from nmm.control.equations import step
 from nmm.functions.function import Stage
@@ -27,9 +30,6 @@ from nmm.functions.objectives import Sum
 from nmm.functions.program import Program, evaluate
 from nmm.functions.tasks import LinearCoordinates, Task
 from nmm.functions.tasks.task import Comparison
-from nmm.kernels.compiled import Kernel
-from nmm.kernels.record_layout import Memory, views
-from nmm.kernels.records import At, Frames, Rows
 from nmm.resolvers import (
     CallableResolver,
     DampedLeastSquares,

@@ -12,8 +12,8 @@ import pytest
 from findings import codes
 
 import nmm
+from nmm.base.kernels.compiled import Kernel
 from nmm.control.step_size import StepSize
-from nmm.kernels.compiled import Kernel
 from nmm.runs import closed_loop
 from nmm.runs.compiled_loop import CompiledLoop
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import nmm
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 

@@ -12,8 +12,8 @@ from numpy import pi
 from numpy.typing import NDArray
 from paper_cases import CIRCLE, H1, TIP
 
+from nmm.base.errors import InputError, NmmError, SingularError
 from nmm.control.controller import Controller
-from nmm.errors import InputError, NmmError, SingularError
 from nmm.functions.objectives import (
     CallableObjective,
     JointRange,

@@ -15,7 +15,7 @@ from findings import refused
 from fuzz.damaging import copied, whole_folders
 
 import nmm
-from nmm.bundled import bundled_robots
+from nmm.base.bundled import bundled_robots
 from nmm.cli.exit_status import status_of
 from nmm.cli.playing import runs_in
 from nmm.robots.loading.description import describe

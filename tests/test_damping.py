@@ -11,7 +11,7 @@ import pytest
 from conditioned import Array, each_shape, with_condition, with_singular_values
 from findings import refused
 
-from nmm.kernels.linear_algebra import singular_rows
+from nmm.base.kernels.linear_algebra import singular_rows
 from nmm.resolvers import (
     DampedLeastSquares,
     ExtendedJacobian,

@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 import nmm
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.playback.meshes import OFF, Indices, _light, decimated, mesh_pieces
 
 Mesh = tuple[Array, Indices]

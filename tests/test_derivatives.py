@@ -21,6 +21,7 @@ from paper_cases import CASES, Case
 from platform_grid import EXAMPLES, random_qp
 
 from nmm.analysis.singular.jacobians import Reached
+from nmm.base.kinds import OBJECTIVES, REFERENCES, TASKS
 from nmm.control.controller import Controller
 from nmm.functions.function import Function
 from nmm.functions.objectives import Clearance, Manipulability, Objective, Quadratic, QuadraticTerm, Sum
@@ -31,7 +32,6 @@ from nmm.functions.tasks import LinearCoordinates, MeasuredPoints, Position, Tas
 from nmm.functions.tasks.measured import MeasuredPoint
 from nmm.functions.tasks.pose import PartsOfPose
 from nmm.functions.tasks.task import Comparison
-from nmm.kinds import OBJECTIVES, REFERENCES, TASKS
 from nmm.plans.following import FromPlan
 from nmm.plans.parking import Parking
 from nmm.resolvers import ProjectedGradient

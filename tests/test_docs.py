@@ -26,10 +26,10 @@ from worked_examples import FILES, write_examples
 
 import nmm
 import nmm.paper
-from nmm.bundled import bundled_scenarios
+from nmm.base.bundled import bundled_scenarios
+from nmm.base.kinds import OBJECTIVES, PLATFORMS, REFERENCES, RESOLVERS, TASKS, Kinds
 from nmm.cli.app import app
 from nmm.cli.exit_status import status_of
-from nmm.kinds import OBJECTIVES, PLATFORMS, REFERENCES, RESOLVERS, TASKS, Kinds
 from nmm.paper import write
 
 ROOT = Path(__file__).resolve().parent.parent

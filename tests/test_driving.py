@@ -22,13 +22,13 @@ from tornado.ioloop import IOLoop
 from tornado.websocket import websocket_connect
 
 import nmm
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError, ScenarioError
+from nmm.base.kinds import RESOLVERS
 from nmm.driving.driven import Driven, Reaching
 from nmm.driving.planning import Planning
 from nmm.driving.session import Aim, DriveSession, Order, Pick, parsed
 from nmm.driving.setups import DriveSetup, RobotSetup, ScenarioSetup, Settings
-from nmm.errors import InputError, ScenarioError
-from nmm.kinds import RESOLVERS
 from nmm.playback.rolling import Rolling
 from nmm.robots.configuration import Configuration
 

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import nmm
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.cli.torques import torques
 from nmm.dynamics.support import Support, hull
 from nmm.dynamics.torques import accelerations, torques_along

@@ -15,7 +15,7 @@ import pytest
 from test_dynamics import moving, robot_of
 
 import nmm
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.dynamics.support import Support
 
 mujoco = pytest.importorskip("mujoco")

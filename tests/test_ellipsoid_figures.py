@@ -13,9 +13,9 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from nmm.analysis.singular.ellipsoids import drawn_ellipsoids, drawn_scale, ellipsoids_along
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError
 from nmm.cli.exit_status import status_of
-from nmm.errors import InputError
 from nmm.figures.ellipses import ellipses
 from nmm.playback.ellipsoids import CLOSE, EllipsoidOptions, SceneEllipsoids, between_error
 from nmm.playback.extent import extent_of

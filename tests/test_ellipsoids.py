@@ -10,8 +10,8 @@ from ellipsoid_examples import columns, directions, jacobian, load, random_q, sw
 
 import nmm
 from nmm.analysis.singular.ellipsoids import Ellipsoids, carried_frame, ellipsoids_along, frame_of
-from nmm.arrays import Array
-from nmm.errors import InputError
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError
 from nmm.playback.ellipsoids import EllipsoidOptions
 from nmm.robots.configuration import Configuration
 

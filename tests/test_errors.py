@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import nmm
-from nmm.arrays import counted, increasing, infinite, matrix, nonzero_vector, positive, scalar, vector
-from nmm.errors import (
+from nmm.base.arrays import counted, increasing, infinite, matrix, nonzero_vector, positive, scalar, vector
+from nmm.base.errors import (
     MOST,
     NOTHING,
     InputError,

@@ -16,14 +16,14 @@ from paper_cases import CASES, H1, TIP, Case
 from symbolic_checks import check_numbers
 
 from nmm.analysis.formulas import symbolic
+from nmm.base.errors import InputError
+from nmm.base.kernels.compiled import PLATFORM, Kernel, kernel
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.control.controller import Controller
-from nmm.errors import InputError
 from nmm.functions.function import Function, Row, Shown, Stage
 from nmm.functions.objectives import Manipulability, Sum
 from nmm.functions.references import Line
 from nmm.functions.tasks import CallableFunction, Position, Task
-from nmm.kernels.compiled import PLATFORM, Kernel, kernel
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.platforms import Platform
 from nmm.resolvers import Dimensions, Problem, ProjectedGradient, ReducedGradient, Resolver, Setup, State
 from nmm.resolvers.answer import AnswerArrays, certify

@@ -13,9 +13,9 @@ from figure_examples import check_legible, run
 from matplotlib.figure import Figure
 
 from nmm import figures
-from nmm.bundled import bundled_scenarios
-from nmm.errors import InputError
-from nmm.figure_options import WIDTHS, FigureOptions
+from nmm.base.bundled import bundled_scenarios
+from nmm.base.errors import InputError
+from nmm.base.figure_options import WIDTHS, FigureOptions
 from nmm.figures.composed import write_run_figures
 from nmm.figures.motion import Scene
 from nmm.figures.silhouette import hull

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from nmm import resolver_style
+from nmm.base import resolver_style
 from nmm.figures import style
 from nmm.figures.silhouette import Silhouette, hull
 from nmm.robots.robot import Robot

@@ -18,8 +18,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from nmm import figures
+from nmm.base.errors import InputError
 from nmm.control.controller import Controller
-from nmm.errors import InputError
 from nmm.figures import style
 from nmm.functions.tasks import Heading, LinearCoordinates, Position, Task
 from nmm.resolvers import ProjectedGradient

@@ -14,10 +14,11 @@ import pytest
 from findings import the, why
 
 import nmm
+from nmm.base.findings import Finding, run, words
+from nmm.base.findings.run import line
 from nmm.cli import runs as commands
 from nmm.diagnosis.judgement import Trials
-from nmm.findings import Finding, bag, loop, run, words
-from nmm.findings.run import line
+from nmm.findings import bag, loop
 from nmm.runs.verdict import Awaited
 
 PART = {"name": "q1", "t": 0.5, "value": 1.25, "unit": "rad", "lower": -1.0, "upper": 1.0}

@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from nmm.errors import RobotError
-from nmm.findings import Finding
-from nmm.findings.robot_file import WORDS as FILE
-from nmm.findings.robot_file import refusal
-from nmm.findings.robot_loading import WORDS as LOADING
+from nmm.base.errors import RobotError
+from nmm.base.findings import Finding
+from nmm.base.findings.robot_file import WORDS as FILE
+from nmm.base.findings.robot_file import refusal
+from nmm.base.findings.robot_loading import WORDS as LOADING
 
 #: By code: values, where, and the sentence.
 EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {

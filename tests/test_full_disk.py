@@ -17,7 +17,7 @@ from killing import Commands
 from test_killed_commands import CASES, content, files, hidden
 
 import nmm
-from nmm.files import UnwrittenError
+from nmm.base.files import UnwrittenError
 from nmm.playback import write_html
 from nmm.robots.motion import Motion
 

@@ -12,7 +12,7 @@ import pytest
 from findings import codes
 
 import nmm
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.robots.robot import Robot
 from nmm.ros.difference import difference
 

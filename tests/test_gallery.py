@@ -16,9 +16,9 @@ from gallery import Card, Gallery, make_card, render, write_gallery
 from test_paper import Links
 
 import nmm
-from nmm.bundled import bundled_scenarios
+from nmm.base.bundled import bundled_scenarios
+from nmm.base.errors import InputError, RunError
 from nmm.cli.exit_status import status_of
-from nmm.errors import InputError, RunError
 from nmm.runs.table import summary_rows
 
 TWO = ("unicycle_2r_position", "unicycle_3r_out_of_reach")

@@ -18,9 +18,9 @@ from urdf_parts import write
 
 import nmm
 from nmm.analysis.singular.ellipsoids import frame_of
+from nmm.base.files import whole_file
 from nmm.cli.exit_status import status_of
 from nmm.cli.subjects import configuration_at
-from nmm.files import whole_file
 from nmm.folders import run as folders_run
 from nmm.playback.channels import channels
 from nmm.robots.reach import first_tip, tips
@@ -241,7 +241,7 @@ def test_a_page_leaves_nothing_of_a_writer_that_was_killed(tmp_path: Path) -> No
     page, other = tmp_path / "page.html", tmp_path / ".page.html-abcdefgh-notes"
     other.write_text("mine")
     code = (
-        "import os, signal, sys; from pathlib import Path; from nmm.files import whole_file\n"
+        "import os, signal, sys; from pathlib import Path; from nmm.base.files import whole_file\n"
         "with whole_file(Path(sys.argv[1])) as file:\n"
         "    file.write_text('half'); os.kill(os.getpid(), signal.SIGKILL)"
     )

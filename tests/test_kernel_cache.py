@@ -17,10 +17,10 @@ import numpy as np
 import pytest
 from numba import types
 
-from nmm import disk_cache
-from nmm.arrays import Array
-from nmm.kernels import cache
-from nmm.kernels.compiled import compiled
+from nmm.base import disk_cache
+from nmm.base.arrays import Array
+from nmm.base.kernels import cache
+from nmm.base.kernels.compiled import compiled
 
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
 SIGNATURE = types.void(types.float64[::1], types.float64)
@@ -159,7 +159,7 @@ def test_an_interrupted_write_leaves_what_was_there(tmp_path: Path, monkeypatch:
 MODULE = """
 import json, sys
 import numpy as np
-from nmm.kernels.compiled import compiled
+from nmm.base.kernels.compiled import compiled
 
 @compiled
 def double(x):
@@ -239,8 +239,8 @@ def test_only_folders_of_kernels_are_forgotten(tmp_path: Path) -> None:
 
 PARTS = """
 import json, sys
-from nmm.kernels.cache import cache_folder
-from nmm.kernels.compiled import compiled
+from nmm.base.kernels.cache import cache_folder
+from nmm.base.kernels.compiled import compiled
 
 @compiled
 def root(x):

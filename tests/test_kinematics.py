@@ -8,9 +8,9 @@ from findings import refused
 from robot_grid import BASES, DATA, built
 
 import nmm
-from nmm.bundled import bundled_robots, bundled_scenarios
+from nmm.base.bundled import bundled_robots, bundled_scenarios
+from nmm.base.kernels.kinematics import place_frames
 from nmm.collisions.pairs import random_configurations
-from nmm.kernels.kinematics import place_frames
 from nmm.robots.configuration import kinematics_updater
 from nmm.robots.joint_table import frame_table
 from nmm.robots.robot import CENTER_OF_MASS

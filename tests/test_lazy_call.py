@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import nmm
-from nmm.lazy_call import lazy_call
+from nmm.base.lazy_call import lazy_call
 
 SOURCES = sorted(Path(nmm.__file__).parent.rglob("*.py"))
 CALLED = sorted(

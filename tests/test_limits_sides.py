@@ -10,10 +10,10 @@ import pytest
 import yaml
 
 import nmm
-from nmm.arrays import Array
-from nmm.errors import InputError
-from nmm.findings import Finding
-from nmm.text_format import apart
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError
+from nmm.base.findings import Finding
+from nmm.base.text_format import apart
 
 DT = 0.01
 SIDES = {"v": [-3.0, 1.0], "omega": 2.0, "arm": [-2.0, 4.0]}

@@ -1,4 +1,4 @@
-"""The loops of nmm.kernels.linear_algebra against numpy."""
+"""The loops of nmm.base.kernels.linear_algebra against numpy."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from conditioned import with_condition
 from numpy.typing import NDArray
 
-from nmm.kernels.linear_algebra import (
+from nmm.base.kernels.linear_algebra import (
     closest_solution,
     eliminate,
     orthonormal_rows,

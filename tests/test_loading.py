@@ -19,9 +19,9 @@ from findings import assert_found, of_code, refused, refused_for
 from numpy.typing import NDArray
 from urdf_parts import AXIS, LIMIT, inertial, joint, link, random_tree, robot, shape, write
 
-import nmm.bundled as bundled
-from nmm.bundled import bundled_robots, bundled_scenarios
-from nmm.errors import InputError, NmmError, RobotError
+import nmm.base.bundled as bundled
+from nmm.base.bundled import bundled_robots, bundled_scenarios
+from nmm.base.errors import InputError, NmmError, RobotError
 from nmm.platforms import PLATFORMS, Layout, Unicycle
 from nmm.robots.loading import load
 from nmm.robots.robot import Robot

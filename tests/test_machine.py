@@ -16,8 +16,8 @@ import pytest
 from findings import refused
 
 import nmm
+from nmm.base.machine import made_with, versions
 from nmm.cli.exit_status import status_of
-from nmm.machine import made_with, versions
 
 KEYS = ["nmm", "python", "numpy", "pinocchio", "numba", "system", "processor", "cores"]
 SHORT = ("--set", "duration=0.1")

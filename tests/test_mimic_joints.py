@@ -25,8 +25,8 @@ from nmm.analysis.search.many_starts import find_singularities
 from nmm.analysis.search.nearest import nearest_singularity
 from nmm.analysis.singular.jacobians import Jacobians
 from nmm.analysis.singular.singularity import analyse
+from nmm.base.errors import InputError, RobotError
 from nmm.cli.exit_status import status_of
-from nmm.errors import InputError, RobotError
 from nmm.playback.viewer import viewer_scene
 from nmm.robots.configuration import Configuration
 from nmm.robots.loading.packages import package_file

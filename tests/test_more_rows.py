@@ -7,8 +7,8 @@ import pytest
 from findings import the
 
 import nmm
-from nmm.arrays import Array
-from nmm.errors import InputError
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError
 from nmm.resolvers.answer import Status
 from nmm.robots.robot import Robot
 

@@ -10,7 +10,7 @@ from command_line import Result
 from short_scenario import MINIMAL, scenario
 
 from nmm import Configuration, Scenario, ScenarioError, Trajectory
-from nmm.bundled import bundled_scenarios
+from nmm.base.bundled import bundled_scenarios
 from nmm.cli.exit_status import status_of
 from nmm.scenario.document import read_file
 

@@ -16,7 +16,7 @@ from playback_browser import window as window
 from playback_robot import drive
 
 import nmm
-from nmm.errors import InputError
+from nmm.base.errors import InputError
 from nmm.playback import Page
 from nmm.robots.robot import Robot
 

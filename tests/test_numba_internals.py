@@ -13,7 +13,7 @@ import numba
 import numpy as np
 import pytest
 
-from nmm.kernels import compiled, numba_internals
+from nmm.base.kernels import compiled, numba_internals
 from nmm.paper.cases import CASES
 from nmm.runs.trajectory import Trajectory
 from nmm.scenario import Scenario
@@ -63,7 +63,7 @@ OTHERS = {
 PARTS = """
 import json
 from numba import types
-from nmm.kernels.compiled import call_platform, caller, compiled, kernel, checked_by_caller, scratch
+from nmm.base.kernels.compiled import call_platform, caller, compiled, kernel, checked_by_caller, scratch
 
 NUMBER = types.float64(types.float64)
 through = caller(NUMBER)

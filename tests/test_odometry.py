@@ -17,8 +17,8 @@ from gripping import PANDA, folding, hitched
 from scipy.integrate import solve_ivp
 
 import nmm
-from nmm.arrays import Array
-from nmm.errors import InputError
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError
 from nmm.robots.robot import Robot
 from nmm.robots.wheel_rates import wheel_rates, wheel_shares
 

@@ -213,7 +213,7 @@ def test_strangers_are_not_read_before_they_are_needed(patrol: Installed) -> Non
     code = (
         "import sys, nmm; nmm.load('unicycle_2r'); nmm.ProjectedGradient();"
         "assert 'nmm_patrol' not in sys.modules;"
-        "print('least_norm' in nmm.kinds.RESOLVERS, 'nmm_patrol.patrol' in sys.modules)"
+        "print('least_norm' in nmm.base.kinds.RESOLVERS, 'nmm_patrol.patrol' in sys.modules)"
     )
     assert patrol.python("-c", code).stdout == "True False\n"
 

@@ -16,17 +16,17 @@ import pytest
 from playback_browser import browser as browser
 from playwright.sync_api import Browser
 
-from nmm.errors import InputError, RunError
-from nmm.figure_options import FigureOptions
+from nmm.base.errors import InputError, RunError
+from nmm.base.figure_options import FigureOptions
+from nmm.base.machine import made_with
+from nmm.base.text_format import number_text
 from nmm.folders.run import is_run
-from nmm.machine import made_with
 from nmm.paper import PaperReport, write, write_paper
 from nmm.paper.cases import CASES, CaseResult, Claim, Row
 from nmm.paper.claims import claims, decay_rate, ripple, settling_time, smallest_determinant
 from nmm.paper.write import render
 from nmm.runs.trajectory import Trajectory
 from nmm.scenario import Scenario
-from nmm.text_format import number_text
 
 Progress = Callable[[float], None]
 

@@ -1,4 +1,4 @@
-"""Functions compiled by other processes at once (`nmm.kernels.parallel_compile`)."""
+"""Functions compiled by other processes at once (`nmm.base.kernels.parallel_compile`)."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from nmm.cores import cores
+from nmm.base.cores import cores
 
 pytestmark = pytest.mark.skipif(cores() < 2 or os.name != "posix", reason="one core: nobody compiles ahead")
 
 FUNCTIONS = """
 import time
 from numba import types
-from nmm.kernels.compiled import compiled, kernel
+from nmm.base.kernels.compiled import compiled, kernel
 
 CELL = types.void(types.float64[::1])
 
@@ -42,9 +42,9 @@ SCRIPT = """
 import os, sys, time
 from pathlib import Path
 import functions
-from nmm.cores import cores
-from nmm.kernels import parallel_compile
-from nmm.kernels.cache import cache_folder, under_way
+from nmm.base.cores import cores
+from nmm.base.kernels import parallel_compile
+from nmm.base.kernels.cache import cache_folder, under_way
 parallel_compile.OURS = "functions"
 parallel_compile.cores = {cores}
 print("script", flush=True)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nmm
-from nmm.errors import InputError
+from nmm.base.errors import InputError
 from nmm.functions.program import Program
 from nmm.plans import parking
 

@@ -10,8 +10,8 @@ from numpy import pi
 from numpy.typing import NDArray
 
 from nmm.analysis.redundancy.laps import Repeatability, repeatability
+from nmm.base.errors import InputError
 from nmm.control.controller import Controller
-from nmm.errors import InputError
 from nmm.functions.references import Bearing, Circle, Constant, Line, PoseReference, Spline, SteadyTurn
 from nmm.functions.tasks import Heading, Orientation, Pose, Position, Task
 from nmm.resolvers import ProjectedGradient

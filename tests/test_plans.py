@@ -410,13 +410,13 @@ def test_compare_runs_the_plan_and_each_resolver_without_it(tmp_path, capfd):
     ],
 )
 def test_a_wrong_key_of_a_plan_is_named(plan, key):
-    with pytest.raises(nmm.errors.ScenarioError) as found:
+    with pytest.raises(nmm.base.errors.ScenarioError) as found:
         nmm.Scenario.load("behind_the_wall", {"plan": plan}).run()
     assert key in found.value.where
 
 
 def test_a_target_that_moves_is_no_goal_of_a_plan():
-    with pytest.raises(nmm.errors.ScenarioError) as found:
+    with pytest.raises(nmm.base.errors.ScenarioError) as found:
         nmm.Scenario.load("unicycle_2r_position", {"plan": True}).run()
     assert "moves" in found.value.what
 

@@ -178,7 +178,7 @@ def test_a_plan_without_room_for_the_margin_is_made_without_it():
 
 
 def test_a_duration_that_is_too_short_for_the_plan_is_refused():
-    with pytest.raises(nmm.errors.ScenarioError) as found:
+    with pytest.raises(nmm.base.errors.ScenarioError) as found:
         nmm.Scenario.load("behind_the_wall", {"plan.track": True, "duration": 5}).run()
     assert "duration" in found.value.where
 

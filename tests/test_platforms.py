@@ -15,7 +15,7 @@ from platform_grid import EXAMPLES, random_qp
 from platform_wheels import bodies, contacts, slips
 from scipy.linalg import expm
 
-from nmm.errors import InputError
+from nmm.base.errors import InputError
 from nmm.platforms import (
     PLATFORMS,
     Car,

@@ -14,8 +14,8 @@ import pytest
 import trimesh
 from playback_robot import drive, hand_built_robot, straight
 
-from nmm.errors import InputError, RobotError
-from nmm.files import UnwrittenError
+from nmm.base.errors import InputError, RobotError
+from nmm.base.files import UnwrittenError
 from nmm.platforms import Unicycle
 from nmm.playback import Motion, play, wheel_angles, wheel_rates, write_html
 from nmm.playback.keyframes import LARGEST_TURN, ghost_samples, ghost_times, keyframes

@@ -15,7 +15,7 @@ from live_pages import dead_page
 from playback_robot import drive, hand_built_robot, straight
 from ports import MOST, free_port, listening, start_player, wait_for
 
-from nmm.errors import InputError, RunError
+from nmm.base.errors import InputError, RunError
 from nmm.playback import LiveViewer, play, wheel_angles
 from nmm.robots.robot import Robot
 

@@ -19,8 +19,8 @@ from playback_browser import window as window
 from playback_robot import drive, hand_built_robot
 from playwright.sync_api import Browser, Page
 
+from nmm.base.resolver_style import resolver_styles
 from nmm.playback import write_html
-from nmm.resolver_style import resolver_styles
 from nmm.runs.trajectory import Trajectory
 
 NAMES = ("RG", "PG", "EJ")

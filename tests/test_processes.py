@@ -16,8 +16,8 @@ from typing import Any
 
 import pytest
 
-from nmm.errors import InputError, RunError
-from nmm.processes import share_out
+from nmm.base.errors import InputError, RunError
+from nmm.base.processes import share_out
 
 Progress = Callable[[float], None]
 

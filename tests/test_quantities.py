@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import nmm
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
 from nmm.control.quantities import QUANTITIES, Curve, Number, Record, RecordedQuantity, saved
 from nmm.control.recorded import Recorded
 from nmm.control.step import Step

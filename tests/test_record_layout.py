@@ -8,11 +8,10 @@ import numba
 import numpy as np
 import pytest
 
-from nmm.arrays import Array, Integers
-from nmm.functions.references import Circle
-from nmm.kernels.cache import cache_folder
-from nmm.kernels.compiled import compiled
-from nmm.kernels.record_layout import (
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.cache import cache_folder
+from nmm.base.kernels.compiled import compiled
+from nmm.base.kernels.record_layout import (
     Cell,
     IntegerCell,
     IntegerMatrix,
@@ -25,7 +24,8 @@ from nmm.kernels.record_layout import (
     header_length,
     views,
 )
-from nmm.kernels.records import Rows
+from nmm.base.kernels.records import Rows
+from nmm.functions.references import Circle
 
 
 class Inner(NamedTuple):

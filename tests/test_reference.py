@@ -42,7 +42,7 @@ THINGS = public_names()
 def test_the_reference_lists_every_public_name_once() -> None:
     pages = {path.stem: path.read_text("utf-8") for path in (ROOT / "docs" / "api").glob("*.md")}
     listed = [found for page in pages.values() for found in re.findall(r"\.\. auto(\w+):: (\S+)", page)]
-    run = "for classes of nmm/kinds.py run python docs/make_kind_lists.py"
+    run = "for classes of nmm/base/kinds.py run python docs/make_kind_lists.py"
     assert Counter(name for _, name in listed) == Counter([*THINGS]), run
     for kind, name in listed:
         thing = THINGS[name]

@@ -27,7 +27,7 @@ from playback_robot import drive
 from ports import MOST
 
 import nmm
-from nmm.errors import InputError, RunError
+from nmm.base.errors import InputError, RunError
 from nmm.rendering import encoder, render
 from nmm.rendering.chromium import HeadlessPage
 from nmm.robots.robot import Robot

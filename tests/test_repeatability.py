@@ -14,8 +14,8 @@ from short_scenario import scenario
 
 import nmm
 from nmm.analysis.redundancy.laps import Laps, Repeatability, repeatability
+from nmm.base.errors import InputError
 from nmm.control.controller import Controller
-from nmm.errors import InputError
 from nmm.figures.repeatability import laps as laps_figure
 from nmm.functions.references import Circle
 from nmm.functions.tasks import Heading, LinearCoordinates, Position, Task

@@ -16,9 +16,9 @@ import pytest
 from command_line import NMM
 
 import nmm
+from nmm.base.errors import InputError
+from nmm.base.files import UnwrittenError, writing
 from nmm.cli.exit_status import status_of
-from nmm.errors import InputError
-from nmm.files import UnwrittenError, writing
 from nmm.folders import whole
 from nmm.folders.whole import FolderKind, check_folder, replaced_folder, steady
 

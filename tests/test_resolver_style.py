@@ -9,8 +9,18 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from nmm import kinds
-from nmm.resolver_style import BLUE, GREEN, OF_RUNS, PINK, VERMILLION, looks, pretty, rate, resolver_styles
+from nmm.base import kinds
+from nmm.base.resolver_style import (
+    BLUE,
+    GREEN,
+    OF_RUNS,
+    PINK,
+    VERMILLION,
+    looks,
+    pretty,
+    rate,
+    resolver_styles,
+)
 
 #: What readers without one kind of cone see, in linear sRGB, row by row: Machado, Oliveira and Fernandes,
 #: "A Physiologically-based Model for Simulation of Color Vision Deficiency", IEEE TVCG 15(6), 2009, at 1.
@@ -111,7 +121,7 @@ def test_a_resolver_looks_the_same_everywhere() -> None:
 def test_further_resolvers_have_looks_of_their_own(monkeypatch: pytest.MonkeyPatch, count: int) -> None:
     names = [*BUNDLED, *(f"mine_{k}" for k in range(4, count))]
     registered = dict.fromkeys(names, object)
-    monkeypatch.setattr("nmm.resolver_style.RESOLVERS", kinds.Kinds("resolver", **registered))
+    monkeypatch.setattr("nmm.base.resolver_style.RESOLVERS", kinds.Kinds("resolver", **registered))
     styles = resolver_styles()
     assert dict([*styles.items()][:4]) == BUNDLED
     assert len({color for color, _ in styles.values()}) == 6

@@ -14,8 +14,8 @@ from findings import refused
 from numpy.typing import NDArray
 from resolver_grid import every_resolver
 
-from nmm.errors import InputError
-from nmm.kinds import RESOLVERS
+from nmm.base.errors import InputError
+from nmm.base.kinds import RESOLVERS
 from nmm.resolvers import (
     Answer,
     CallableResolver,

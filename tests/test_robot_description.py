@@ -17,7 +17,7 @@ from test_mounting import PANDA, UR5
 from urdf_parts import joint, link, random_tree, robot, shape, write
 
 import nmm
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.cli.exit_status import status_of
 from nmm.playback.placements import rolling_joints
 from nmm.robots.robot import Robot

@@ -13,7 +13,7 @@ from loop_faults import BEGINS, FAULTS, PERIOD, drive, make_loop, try_fault
 from wandering import beyond
 
 import nmm
-from nmm.findings import Finding
+from nmm.base.findings import Finding
 from nmm.findings.loop import WORDS
 from nmm.robots.zero_order_hold import HeldInputs
 from nmm.runs.measured_state import Refused

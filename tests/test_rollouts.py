@@ -10,7 +10,7 @@ from findings import refused
 from scipy.integrate import solve_ivp
 
 import nmm
-from nmm import machine
+from nmm.base import machine
 from nmm.robots.zero_order_hold import HeldInputs
 from nmm.rollouts import kept
 from nmm.rollouts.kept import least_singular_value

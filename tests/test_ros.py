@@ -14,7 +14,7 @@ import pytest
 from gripping_cart import cart
 
 import nmm
-from nmm.errors import InputError
+from nmm.base.errors import InputError
 from nmm.robots.robot import Robot
 
 typesys = pytest.importorskip("rosbags.typesys")

@@ -12,7 +12,7 @@ from numpy import pi
 from numpy.typing import NDArray
 
 from nmm import rotation_vector
-from nmm.kernels.rotations import (
+from nmm.base.kernels.rotations import (
     between3,
     compose3,
     exp3,

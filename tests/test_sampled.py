@@ -14,10 +14,9 @@ import numpy as np
 import pytest
 
 import nmm
-from nmm.arrays import Array, Integers
-from nmm.control.idle_inputs import idle_inputs
-from nmm.kernels.compiled import Kernel, kernel
-from nmm.kernels.record_layout import (
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import Kernel, kernel
+from nmm.base.kernels.record_layout import (
     Cell,
     Memory,
     SampledCell,
@@ -27,6 +26,7 @@ from nmm.kernels.record_layout import (
     put_back,
     views,
 )
+from nmm.control.idle_inputs import idle_inputs
 from nmm.resolvers.answer import AnswerArrays, certify
 from nmm.resolvers.base import RESOLVER, Resolver, Setup, State
 from nmm.resolvers.problem import Dimensions
@@ -245,7 +245,7 @@ def test_sampled_fields_of_any_record_are_one_range_of_each_block() -> None:
         memory.add(Outer(np.ones(2), np.arange(3), Inner(np.array(k), np.array(5.0)))) for k in (7.0, 8.0)
     ]
     blocks = memory.blocks()
-    integers, floats = nmm.kernels.record_layout.sampled(*blocks)
+    integers, floats = nmm.base.kernels.record_layout.sampled(*blocks)
     np.testing.assert_array_equal(integers, [0, 1, 2] * 2)
     np.testing.assert_array_equal(floats, [7.0, 8.0])
     one, other = (views(Outer, *blocks, place) for place in places)

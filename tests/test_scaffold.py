@@ -15,7 +15,7 @@ from small_pictures import draw_only
 from urdf_parts import joint, link, robot, shape, write
 
 import nmm
-from nmm.bundled import bundled_robots
+from nmm.base.bundled import bundled_robots
 from nmm.cli.exit_status import status_of
 from nmm.figures.style import figure, save
 from nmm.folders.run import is_run
@@ -126,7 +126,12 @@ def test_every_key_has_its_words(run: Command) -> None:
     assert all(lines[i - 1].startswith("# ") for i in keys)
     assert max(map(len, lines)) <= 116
     said = " ".join(line.removeprefix("# ") for line in lines if line.startswith("#"))
-    kinds = (*nmm.kinds.TASKS, *nmm.kinds.REFERENCES, *nmm.kinds.OBJECTIVES, *nmm.kinds.RESOLVERS)
+    kinds = (
+        *nmm.base.kinds.TASKS,
+        *nmm.base.kinds.REFERENCES,
+        *nmm.base.kinds.OBJECTIVES,
+        *nmm.base.kinds.RESOLVERS,
+    )
     assert [kind for kind in kinds if kind not in said] == []
     assert "the end of the longest chain: 3 joints" in said
 

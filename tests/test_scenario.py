@@ -15,8 +15,8 @@ from short_scenario import MINIMAL, scenario
 
 import nmm
 from nmm import Scenario, ScenarioError
-from nmm.bundled import bundled_scenarios
-from nmm.kinds import RESOLVERS
+from nmm.base.bundled import bundled_scenarios
+from nmm.base.kinds import RESOLVERS
 from nmm.scenario.numbers import evaluate, number
 
 # Numbers

@@ -13,7 +13,8 @@ from short_scenario import scenario
 
 import nmm
 import nmm.resolvers
-from nmm import Scenario, ScenarioError, kinds
+from nmm import Scenario, ScenarioError
+from nmm.base import kinds
 from nmm.control.integrators import METHODS
 from nmm.robots.configuration import Configuration
 from nmm.scenario.collisions import SHAPE_PARTS
@@ -235,7 +236,7 @@ def test_every_kind_is_a_public_name(listed: kinds.Kinds) -> None:
         public = getattr(nmm, kind.__name__, None)
         assert public is kind, f"{name}: nmm.{kind.__name__} is missing: run python docs/make_kind_lists.py"
         own = getattr(kind, "name", name)
-        assert own == name, f"{kind.__name__} calls itself {own}, nmm.kinds calls it {name}"
+        assert own == name, f"{kind.__name__} calls itself {own}, nmm.base.kinds calls it {name}"
 
 
 def test_the_methods_are_the_integrators() -> None:

@@ -14,7 +14,7 @@ import yourdfpy
 from urdf_parts import inertial, joint, link, random_tree, robot, write
 
 import nmm
-from nmm.bundled import bundled_robots
+from nmm.base.bundled import bundled_robots
 from nmm.robots.loading.check import check_mimics, inspect
 from nmm.robots.loading.description import describe
 from nmm.robots.loading.packages import package_file

@@ -17,7 +17,7 @@ from spatial_arms import UR5
 import nmm
 from nmm.analysis.redundancy.moving import SelfMotion, self_motion
 from nmm.analysis.redundancy.report import redundancy
-from nmm.errors import InputError, SingularError
+from nmm.base.errors import InputError, SingularError
 from nmm.functions.tasks import Pose, Position, Task
 from nmm.playback import write_html
 from nmm.robots.configuration import Configuration

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import nmm
+from nmm.base.kernels.kinematics import axes, place_joints
+from nmm.base.kernels.record_layout import views
 from nmm.collisions.legs_check import (
     MovedShapes,
     along,
@@ -17,8 +19,6 @@ from nmm.collisions.legs_check import (
 from nmm.collisions.motion_check import MotionCheck
 from nmm.collisions.pairs import random_configurations
 from nmm.collisions.separation import CLOSE
-from nmm.kernels.kinematics import axes, place_joints
-from nmm.kernels.record_layout import views
 from nmm.robots.zero_order_hold import HeldInputs
 
 SHAPES = {

@@ -9,7 +9,7 @@ import pytest
 from ports import listening
 
 import nmm
-from nmm.errors import InputError
+from nmm.base.errors import InputError
 from nmm.playback import session
 from nmm.playback.rolling import RolledRobot, Rolling
 from nmm.playback.session import FPS, LATE, Clock, Session, message

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from urdf_parts import AXIS, LIMIT, joint, link, robot, shape, write
 
-from nmm.bundled import bundled_robots
+from nmm.base.bundled import bundled_robots
+from nmm.base.errors import few
+from nmm.base.text_format import folded
 from nmm.cli.exit_status import status_of
-from nmm.errors import few
-from nmm.text_format import folded
 
 SHARE = "package://example-robot-data/robots/"
 #: With many mimic joints, many missing meshes, wheels that are none, long lists of postures' joints.

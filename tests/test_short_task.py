@@ -11,8 +11,8 @@ import pytest
 from numpy import pi
 
 from nmm import Scenario
+from nmm.base.errors import InputError
 from nmm.cli.subjects import studied
-from nmm.errors import InputError
 from nmm.functions.function import Function
 from nmm.functions.program import evaluate
 from nmm.functions.tasks import (

@@ -34,7 +34,7 @@ def test_kernels_do_not_load_scipy_s_linear_algebra() -> None:
     code = """
 import sys
 import numpy as np
-from nmm.kernels.compiled import allocating, compiled
+from nmm.base.kernels.compiled import allocating, compiled
 def product(A, B):
     return A @ B
 def total(values):
@@ -54,7 +54,7 @@ def test_kept_kernels_do_not_load_what_compiles() -> None:
 import sys
 import numpy as np
 import nmm
-from nmm.kernels.compiled import allocating
+from nmm.base.kernels.compiled import allocating
 from nmm.robots.zero_order_hold import RollingPreview
 q, _ = RollingPreview(nmm.load("unicycle_2r"))(np.zeros(5), 0.5)
 assert abs(q[0] - 0.5) < 1e-12

@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Page
 from short_scenario import MINIMAL
 
 import nmm
-from nmm.resolver_style import resolver_styles
+from nmm.base.resolver_style import resolver_styles
 
 
 @pytest.fixture(scope="module")

@@ -20,10 +20,10 @@ from findings import refused
 from short_scenario import MINIMAL
 
 import nmm
-from nmm.bundled import bundled_sweeps
+from nmm.base.bundled import bundled_sweeps
+from nmm.base.errors import NOTHING
 from nmm.cli.app import app
 from nmm.cli.exit_status import status_of
-from nmm.errors import NOTHING
 from nmm.sweeps import folder as sweep_folder
 from nmm.sweeps import rows as sweep_rows
 from nmm.sweeps.definition import SAMPLERS, Listed, Range, parsed

@@ -31,8 +31,8 @@ from symbolic_checks import PAPER, TASKS, made
 
 from nmm.analysis.formulas import SymbolicAnalysis, lower_bound, never_zero, singular_set, symbolic, vanishing
 from nmm.analysis.formulas.zeros import Basis, Limits, Undecided, Zeros
-from nmm.errors import InputError
-from nmm.findings import Finding
+from nmm.base.errors import InputError
+from nmm.base.findings import Finding
 from nmm.functions.tasks import Heading, LinearCoordinates, Position
 from nmm.platforms import Omnidirectional
 from nmm.robots.loading import load

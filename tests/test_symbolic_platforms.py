@@ -19,7 +19,7 @@ from nmm.analysis.formulas.expansion import Ring
 from nmm.analysis.formulas.frames import Frames
 from nmm.analysis.formulas.geometry import Geometry
 from nmm.analysis.formulas.quotient import Quotient, quotient
-from nmm.errors import InputError
+from nmm.base.errors import InputError
 from nmm.functions.references import Bearing, Circle, PoseReference
 from nmm.functions.tasks import (
     CallableFunction,

@@ -18,8 +18,8 @@ from findings import refused
 from typeset import check_text
 
 import nmm
-from nmm import latex
 from nmm.analysis.redundancy import repeatability
+from nmm.base import latex
 from nmm.cli.exit_status import status_of
 from nmm.runs.verdict import Verdict
 from nmm.tables import Quantity, Table, comparison_table, laps_table

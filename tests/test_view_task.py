@@ -20,7 +20,7 @@ from live_pages import LivePage
 from ports import MOST, free_port, listening, wait_for
 
 import nmm
-from nmm.errors import InputError
+from nmm.base.errors import InputError
 from nmm.playback import view
 from nmm.playback.viewed_task import ViewedTask
 from nmm.playback.viewer import asked_for

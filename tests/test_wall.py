@@ -21,7 +21,7 @@ CORE = (
 #: What wings import besides, with the reason.
 EXCEPTIONS = {
     (
-        "nmm.kernels.parallel_compile",
+        "nmm.base.kernels.parallel_compile",
         "compile_in_parallel",
     ): "what a run needs is compiled beforehand, in other processes",
     (
@@ -36,8 +36,14 @@ EXCEPTIONS = {
     ("nmm.functions.program", "PLACE"): "what a run needs is compiled beforehand, in other processes",
     ("nmm.functions.program", "place"): "what a run needs is compiled beforehand, in other processes",
     ("nmm.robots.frame_path", "follow_frame"): "what a run needs is compiled beforehand, in other processes",
-    ("nmm.kernels.spectra", "WRITE_SPECTRA"): "what a run needs is compiled beforehand, in other processes",
-    ("nmm.kernels.spectra", "write_spectra"): "what a run needs is compiled beforehand, in other processes",
+    (
+        "nmm.base.kernels.spectra",
+        "WRITE_SPECTRA",
+    ): "what a run needs is compiled beforehand, in other processes",
+    (
+        "nmm.base.kernels.spectra",
+        "write_spectra",
+    ): "what a run needs is compiled beforehand, in other processes",
     ("nmm.control.equations", "call_step"): "the linearised step, compiled",
     ("nmm.resolvers.partitions", "HELD"): "the linearised step holds RG's partition",
     ("nmm.resolvers.partitions", "MODE"): "the linearised step holds RG's partition",
@@ -45,7 +51,7 @@ EXCEPTIONS = {
         "nmm.functions.callbacks",
         "DIFFERENCE_STEP",
     ): "differences of the same step as those of users' functions",
-    ("nmm.kernels", "records"): "the kernels' records, as a module, traced with symbols",
+    ("nmm.base.kernels", "records"): "the kernels' records, as a module, traced with symbols",
     ("nmm.collisions.pairs", "measured_pairs"): "a scenario's draft leaves out pairs that touch",
     ("nmm.collisions.pairs", "random_configurations"): "a scenario's draft leaves out pairs that touch",
     ("nmm.collisions.pairs", "HULLS"): "a scenario's draft leaves out pairs that touch",

@@ -27,7 +27,7 @@ from wheeled_examples import (
     trailer,
 )
 
-from nmm.errors import NOTHING
+from nmm.base.errors import NOTHING
 from nmm.platforms.wheeled.descriptions import CasterWheel, FixedWheel, Hitch, OmniWheel, SteeredWheel
 from nmm.platforms.wheeled.inputs import CommonSpeed, WeightedSpins, WheelSpeed, WheelSpin
 from nmm.platforms.wheeled.platform import WheeledPlatform

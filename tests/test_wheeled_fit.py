@@ -9,7 +9,7 @@ import pytest
 from numpy import pi
 from wheeled_examples import AXLE, trailer
 
-from nmm.errors import InputError
+from nmm.base.errors import InputError
 from nmm.platforms.recognition import with_roles
 from nmm.platforms.wheel_layout import Layout, Pivot, RollingJoint
 from nmm.platforms.wheeled.descriptions import CasterWheel, Hitch, SteeredWheel

@@ -16,7 +16,7 @@ from findings import assert_found, holds, of_code, refused
 from scipy.integrate import solve_ivp
 from urdf_parts import joint, link, robot, write
 
-from nmm.errors import RobotError
+from nmm.base.errors import RobotError
 from nmm.figures.silhouette import Silhouette
 from nmm.platforms import Omnidirectional, Unicycle
 from nmm.playback import LiveViewer, Motion, wheel_rates, write_html

@@ -24,7 +24,7 @@ def write_examples(folder: Path) -> None:
 
 
 def pytest_configure() -> None:
-    """One line each in `nmm.kinds`, and an example of the function."""
+    """One line each in `nmm.base.kinds`, and an example of the function."""
     folder = tempfile.mkdtemp()
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     write_examples(Path(folder))
@@ -34,7 +34,7 @@ def pytest_configure() -> None:
     from slope import Slope
     from transposed import JacobianTranspose, LeastNorm
 
-    from nmm.kinds import RESOLVERS, TASKS
+    from nmm.base.kinds import RESOLVERS, TASKS
 
     TASKS["slope"] = Slope
     entry = function_grid.Entry("slope", Slope("base_footprint", "ee"), function_grid.SPATIAL)

@@ -14,13 +14,13 @@ from pathlib import Path
 from jinja2 import ChoiceLoader, Environment, FileSystemLoader, PackageLoader, StrictUndefined
 
 import nmm
-from nmm.bundled import bundled_scenarios
-from nmm.errors import NmmError, expect_known
+from nmm.base.bundled import bundled_scenarios
+from nmm.base.errors import NmmError, expect_known
+from nmm.base.processes import share_out
+from nmm.base.progress import Progress, between
 from nmm.figures import save, stroboscopic
 from nmm.folders.whole import FolderKind, replaced_folder
 from nmm.playback.html import page_of, viewer_script
-from nmm.processes import share_out
-from nmm.progress import Progress, between
 from nmm.rendering.chromium import HeadlessPage
 from nmm.runs.table import summary_rows
 
@@ -123,7 +123,7 @@ def _with_scene(card: Card, folder: Path) -> Card:
 
 def render(cards: Sequence[Card]) -> str:
     """index.html; every link in it is relative to the page's folder."""
-    places = ChoiceLoader([FileSystemLoader(Path(__file__).parent), PackageLoader("nmm.templates", ".")])
+    places = ChoiceLoader([FileSystemLoader(Path(__file__).parent), PackageLoader("nmm.base.templates", ".")])
     pages = Environment(
         loader=places, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )

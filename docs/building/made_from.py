@@ -13,7 +13,7 @@ from pathlib import Path
 
 import yaml
 
-from nmm.bundled import bundled_robots, bundled_scenarios
+from nmm.base.bundled import bundled_robots, bundled_scenarios
 
 ROOT = Path(__file__).resolve().parents[2]
 IMAGES = ROOT / "docs" / "images"

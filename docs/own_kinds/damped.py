@@ -4,9 +4,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from nmm.arrays import Array, Integers, positive
-from nmm.kernels.compiled import Kernel, kernel, scratch
-from nmm.kernels.linear_algebra import eliminate
+from nmm.base.arrays import Array, Integers, positive
+from nmm.base.kernels.compiled import Kernel, kernel, scratch
+from nmm.base.kernels.linear_algebra import eliminate
 from nmm.resolvers.answer import RELAXED, AnswerArrays, certify
 from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
 from nmm.resolvers.problem import Dimensions

@@ -3,6 +3,6 @@
 Names are loaded when first used (the list is `__init__.pyi`); formulas are in `nmm.analysis.formulas`.
 """
 
-from nmm.lazy_names import attach
+from nmm.base.lazy_names import attach
 
 __getattr__, __dir__, __all__ = attach(__name__, __file__)

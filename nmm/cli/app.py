@@ -6,7 +6,8 @@ from typing import Annotated, Any
 
 import typer
 
-from nmm.bundled import bundled_robots, bundled_scenarios
+from nmm.base.bundled import bundled_robots, bundled_scenarios
+from nmm.base.plugins import additions, complain, plugins
 from nmm.cli.descriptions import info
 from nmm.cli.mapping import map_measures
 from nmm.cli.options import flag
@@ -16,7 +17,6 @@ from nmm.cli.robot_files import check, init
 from nmm.cli.runs import compare, paper, run
 from nmm.cli.singularities import singularities
 from nmm.cli.torques import torques
-from nmm.plugins import additions, complain, plugins
 
 app = typer.Typer(
     name="nmm",
@@ -29,7 +29,7 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from nmm.machine import versions
+        from nmm.base.machine import versions
 
         print(versions())
         raise typer.Exit

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from nmm.base.errors import InputError, few
 from nmm.cli.groups import Loading, command
 from nmm.cli.options import ARGUMENT, ROBOT_HELP, arguments_of, option
 from nmm.cli.output import WIDTH_OF_A_PIPE, show_table, show_text
-from nmm.errors import InputError, few
 
 if TYPE_CHECKING:
-    from nmm.arrays import Array
+    from nmm.base.arrays import Array
     from nmm.control.controller import Controller
     from nmm.robots.robot import Robot
     from nmm.robots.wheel import Wheel

@@ -5,10 +5,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from textwrap import fill
 from typing import Any, NamedTuple
 
-from nmm.arrays import finite
+from nmm.base.arrays import finite
+from nmm.base.findings import Finding
+from nmm.base.findings.singularities import number_text
 from nmm.cli.output import console, show_table, show_text
-from nmm.findings import Finding
-from nmm.findings.singularities import number_text
 
 #: A number this small beside the largest of its kind is a zero that was rounded.
 ZERO = 1e-10

@@ -9,10 +9,10 @@ from typing import NoReturn
 
 import typer
 
+from nmm.base.errors import InputError, NmmError, RunError
 from nmm.cli.app import app
 from nmm.cli.interrupts import ignore_interrupts, raise_interrupts
 from nmm.cli.output import BAD_INPUT, FAILED, INTERRUPTED, OK, complain, tell_what_takes_long
-from nmm.errors import InputError, NmmError, RunError
 
 #: What typer raises for wrong usage: options that do not exist, arguments that are missing.
 _USAGE_ERROR: type[Exception] = typer.BadParameter.mro()[2]

@@ -13,6 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any, get_origin, get_type_hints
 import typer
 from typer.models import ParameterInfo
 
+from nmm.base.errors import InputError, expect_known
+from nmm.base.kinds import PLATFORMS
+from nmm.base.plugins import OptionGroup, complain, groups_of_options
+from nmm.base.text_format import listed
 from nmm.cli.options import (
     AT,
     SUBJECT_SET,
@@ -24,14 +28,10 @@ from nmm.cli.options import (
     values_of,
     wheels_of,
 )
-from nmm.errors import InputError, expect_known
-from nmm.kinds import PLATFORMS
-from nmm.plugins import OptionGroup, complain, groups_of_options
-from nmm.text_format import listed
 
 if TYPE_CHECKING:
-    from nmm.ellipsoid_options import Wanted
-    from nmm.figure_options import FigureOptions
+    from nmm.base.ellipsoid_options import Wanted
+    from nmm.base.figure_options import FigureOptions
 
 
 @dataclass(frozen=True)
@@ -279,7 +279,7 @@ class Ellipsoids:
         """What they ask for; a scale alone asks for ellipsoids too; `InputError` for one not above zero."""
         if self.ellipsoid_scale is None:
             return self.ellipsoids
-        from nmm.ellipsoid_options import EllipsoidOptions
+        from nmm.base.ellipsoid_options import EllipsoidOptions
 
         return EllipsoidOptions(scale=self.ellipsoid_scale)
 
@@ -296,7 +296,7 @@ class Figures:
     )
 
     def options(self) -> FigureOptions:
-        from nmm.figure_options import FORMATS, FigureOptions
+        from nmm.base.figure_options import FORMATS, FigureOptions
 
         formats = tuple(dict.fromkeys(names_of(self.format, "--format")))
         for name in formats:

@@ -10,12 +10,12 @@ from typing import Annotated, Any
 
 import typer
 
+from nmm.base.errors import InputError
+from nmm.base.plugins import OptionGroup
 from nmm.cli.groups import command
 from nmm.cli.interrupts import shielded
 from nmm.cli.options import flag, names_of, option
 from nmm.cli.output import OK, show_table, show_text, warn
-from nmm.errors import InputError
-from nmm.plugins import OptionGroup
 
 
 @command

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from nmm.base.errors import InputError, expect
 from nmm.cli.groups import Figures, Loading, Subject, command
 from nmm.cli.options import LENGTH, names_of, option, out_option, values_of
 from nmm.cli.output import progress, show_table
-from nmm.errors import InputError, expect
 
 if TYPE_CHECKING:
     from nmm.analysis.maps.result import Map

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from nmm.errors import InputError, NmmError, Setting, expect, no_such
-from nmm.kinds import RESOLVERS, TASKS
-from nmm.text_format import listed, split_outside_brackets
+from nmm.base.errors import InputError, NmmError, Setting, expect, no_such
+from nmm.base.kinds import RESOLVERS, TASKS
+from nmm.base.text_format import listed, split_outside_brackets
 
 if TYPE_CHECKING:
     from nmm.resolvers.base import Resolver
@@ -192,7 +192,7 @@ class Chosen:
 
     @property
     def label(self) -> str:
-        from nmm.resolver_style import pretty
+        from nmm.base.resolver_style import pretty
 
         if self.own is not None:
             return Path(self.text).name

@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from nmm.text_format import folded, one_line, printable
+from nmm.base.text_format import folded, one_line, printable
 
 if TYPE_CHECKING:
     from rich.console import Console, JustifyMethod

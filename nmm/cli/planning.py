@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from nmm.base.errors import InputError
+from nmm.base.text_format import counted
 from nmm.cli.groups import Browser, OfRobot, command
 from nmm.cli.options import ROBOT_HELP, SetOption, flag, names_of, option, out_option, settings_of
 from nmm.cli.output import OK, progress, show_table
 from nmm.cli.runs import tell_and_save
-from nmm.errors import InputError
-from nmm.text_format import counted
 
 if TYPE_CHECKING:
     from nmm.scenario import Scenario
@@ -124,7 +124,7 @@ def plan(
 
 def _scenario(subject: str, to: str | None, obstacles: Path | None) -> Scenario:
     """The scenario that is planned: SUBJECT, or one made for a robot, with the obstacles of a file."""
-    from nmm.bundled import bundled_robots, bundled_scenarios
+    from nmm.base.bundled import bundled_robots, bundled_scenarios
     from nmm.cli.subjects import is_scenario
     from nmm.scenario import Scenario
     from nmm.scenario.document import Document, read_file

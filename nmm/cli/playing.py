@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from nmm.base.errors import InputError, expect
 from nmm.cli.groups import Browser, Ellipsoids, Loading, Subject, command
 from nmm.cli.options import ARM, AT, ROBOT_HELP, SUBJECT_SET, arguments_of, flag, option, task_option
 from nmm.cli.output import progress, show_text, warn
-from nmm.errors import InputError, expect
 
 if TYPE_CHECKING:
     from nmm.driving.setups import DriveSetup

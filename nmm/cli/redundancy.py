@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from nmm.base.errors import InputError, Setting, SingularError, expect
+from nmm.base.files import replaceable
 from nmm.cli.groups import Browser, Figures, Loading, Subject, command
 from nmm.cli.interrupts import shielded
 from nmm.cli.options import (
@@ -24,8 +26,6 @@ from nmm.cli.options import (
     values_of,
 )
 from nmm.cli.output import FAILED, OK, complain, print_table, progress, show_table, show_text, warn
-from nmm.errors import InputError, Setting, SingularError, expect
-from nmm.files import replaceable
 
 if TYPE_CHECKING:
     from nmm.analysis.redundancy.laps import Repeatability
@@ -67,7 +67,7 @@ def redundancy(
     from nmm.analysis.redundancy import report
     from nmm.analysis.redundancy.moving import self_motion as moved_along
     from nmm.analysis.redundancy.null_fields import expect_direction
-    from nmm.arrays import positive
+    from nmm.base.arrays import positive
     from nmm.cli.subjects import studied
 
     if self_motion is None and (html is not None or play):

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from nmm.bundled import bundled_robots
+from nmm.base.bundled import bundled_robots
+from nmm.base.errors import InputError, expect
+from nmm.base.files import PATIENCE, writing, written_at
+from nmm.base.text_format import counted, folded
 from nmm.cli.groups import Loading, command
 from nmm.cli.options import ARGUMENT, ARM, ROBOT_HELP, arguments_of, flag, option
 from nmm.cli.output import BAD_INPUT, OK, complain, readable, show_table, show_text
-from nmm.errors import InputError, expect
-from nmm.files import PATIENCE, writing, written_at
-from nmm.text_format import counted, folded
 
 if TYPE_CHECKING:
-    from nmm.findings import Finding
+    from nmm.base.findings import Finding
     from nmm.robots.loading.report import FileReport
     from nmm.robots.robot import Robot
 
@@ -130,7 +130,7 @@ def _lines(file: str, found: Sequence[Finding], made: FileReport, kind: str) -> 
 
 def _line(file: str, finding: Finding, made: FileReport, kind: str) -> str:
     """file:line: message, as compilers do; the line of an expanded file comes last."""
-    from nmm.findings.robot_file import line_of
+    from nmm.base.findings.robot_file import line_of
 
     message, line = readable(str(finding)), line_of(finding)
     if line is None:

@@ -11,6 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from nmm.base.errors import InputError
+from nmm.base.kinds import RESOLVERS
+from nmm.base.text_format import listed
 from nmm.cli.groups import (
     AddedOptions,
     Browser,
@@ -39,9 +42,6 @@ from nmm.cli.options import (
     settings_of,
 )
 from nmm.cli.output import FAILED, OK, complain, print_table, progress, show_table, warn
-from nmm.errors import InputError
-from nmm.kinds import RESOLVERS
-from nmm.text_format import listed
 
 if TYPE_CHECKING:
     from nmm.control.controller import Controller
@@ -295,7 +295,7 @@ def _run(
     watch: Callable[[Recorder], None] | None = None,
     label: str = "",
 ) -> Trajectory:
-    from nmm.findings import Finding
+    from nmm.base.findings import Finding
     from nmm.runs.verdict import Outcome, Verdict
 
     with progress(f"{scenario.name}, {label or _called(scenario)}") as report:

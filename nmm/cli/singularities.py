@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
+from nmm.base.errors import InputError, expect
+from nmm.base.text_format import listed
 from nmm.cli.groups import AddedOptions, Loading, PlaceOfOptions, Subject, command
 from nmm.cli.options import LENGTH, flag, option
 from nmm.cli.output import warn
-from nmm.errors import InputError, expect
-from nmm.text_format import listed
 
 if TYPE_CHECKING:
     from nmm.analysis.singular.minors import Choice

@@ -12,12 +12,12 @@ from nmm.analysis.singular.algorithmic import volume
 from nmm.analysis.singular.along import Dip, SingularityHistory
 from nmm.analysis.singular.jacobians import stacked
 from nmm.analysis.singular.minors import determinants
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.findings import Finding
+from nmm.base.findings.singularities import named_or_counted
+from nmm.base.latex import block, minor_name
 from nmm.cli.document import Item, Table, fields, number, rounded
 from nmm.cli.singularity_report import header, sizes, subject_data, without_twins
-from nmm.findings import Finding
-from nmm.findings.singularities import named_or_counted
-from nmm.latex import block, minor_name
 from nmm.runs.trajectory import Trajectory
 
 if TYPE_CHECKING:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from nmm.base.errors import InputError, expect
+from nmm.base.plugins import OptionGroup
+from nmm.base.text_format import listed, value_text
 from nmm.cli.options import flag, option
 from nmm.cli.output import OK, progress, show_table, show_text
-from nmm.errors import InputError, expect
-from nmm.plugins import OptionGroup
-from nmm.text_format import listed, value_text
 
 if TYPE_CHECKING:
     from nmm.analysis.search.many_starts import SingularitySearch

@@ -13,14 +13,14 @@ from nmm.analysis.singular.algorithmic import ExtendedSingularity, partition_sin
 from nmm.analysis.singular.jacobians import stacked
 from nmm.analysis.singular.parts import Restoration
 from nmm.analysis.singular.singularity import SingularityReport
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.findings import Finding
+from nmm.base.findings.singularities import named_or_counted
+from nmm.base.latex import Typeset, joined, minor_name, sentence, symbol
+from nmm.base.text_format import measured
 from nmm.cli.document import Item, Table, fields, number, rounded
 from nmm.control.directions import SMALL_PART, direction_text
-from nmm.findings import Finding
-from nmm.findings.singularities import named_or_counted
-from nmm.latex import Typeset, joined, minor_name, sentence, symbol
 from nmm.resolvers.reduced_gradient import ReducedGradient
-from nmm.text_format import measured
 
 if TYPE_CHECKING:
     from nmm.cli.subjects import Studied

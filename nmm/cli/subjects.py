@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nmm.arrays import Array, interpolated, scalar
+from nmm.base.arrays import Array, interpolated, scalar
+from nmm.base.errors import InputError, expect, no_such
 from nmm.cli.options import arguments_of, settings_of, values_of
 from nmm.cli.output import warn
-from nmm.errors import InputError, expect, no_such
 
 if TYPE_CHECKING:
     from nmm.analysis.singular.jacobians import Subject
@@ -139,7 +139,7 @@ def coordinates_at(robot: Robot, at: Sequence[str] | None) -> dict[str, float]:
 
 def _decide(controller: Controller, t: float, q: Array) -> None:
     """Of tasks that come and go, those active at t (s) and q (n,) are looked at; the others are told."""
-    from nmm.text_format import listed
+    from nmm.base.text_format import listed
 
     schedule = controller.schedule
     if schedule is None:
@@ -157,7 +157,7 @@ def _decide(controller: Controller, t: float, q: Array) -> None:
 
 
 def is_scenario(source: str) -> bool:
-    from nmm.bundled import bundled_scenarios
+    from nmm.base.bundled import bundled_scenarios
     from nmm.scenario.scenario import SUFFIXES
 
     return source in bundled_scenarios() or Path(source).expanduser().suffix in SUFFIXES
@@ -167,7 +167,7 @@ def opened(
     source: str, settings: Sequence[str] | None, loading: dict[str, Any]
 ) -> tuple[Trajectory | None, Scenario | None, Robot]:
     """The run, the scenario and the robot of SOURCE; run and scenario where it is one."""
-    from nmm.bundled import bundled_robots, bundled_scenarios
+    from nmm.base.bundled import bundled_robots, bundled_scenarios
     from nmm.robots.loading import load
     from nmm.runs.trajectory import Trajectory
     from nmm.scenario import Scenario

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from nmm.base.errors import InputError, expect, no_such
 from nmm.cli.options import SetOption, option, settings_of
 from nmm.cli.output import FAILED, OK, bar_of, complain, show_table, warn
-from nmm.errors import InputError, expect, no_such
 
 if TYPE_CHECKING:
     from nmm.sweeps.result import SweepResult
@@ -103,7 +103,7 @@ def sweep(
 
 
 def _sweep(name: str, vary: Sequence[str], settings: dict[str, object], given: dict[str, Any]) -> Sweep:
-    from nmm.bundled import bundled_scenarios, bundled_sweeps
+    from nmm.base.bundled import bundled_scenarios, bundled_sweeps
     from nmm.scenario.scenario import SUFFIXES
     from nmm.sweeps.definition import parsed
     from nmm.sweeps.sweep import Sweep, is_sweep_file, read_sweep

@@ -8,12 +8,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nmm.analysis.singular.minors import Columns, chosen_columns
+from nmm.base.errors import InputError
+from nmm.base.findings import Finding
+from nmm.base.latex import Formula, Typeset, capitalised, formula, joined, sentence, symbol
+from nmm.base.text_format import counted
 from nmm.cli.document import say
 from nmm.cli.singularity_report import header, row_names
-from nmm.errors import InputError
-from nmm.findings import Finding
-from nmm.latex import Formula, Typeset, capitalised, formula, joined, sentence, symbol
-from nmm.text_format import counted
 
 if TYPE_CHECKING:
     from nmm.analysis.formulas import Claim, SymbolicAnalysis

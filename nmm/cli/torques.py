@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from nmm.base.errors import InputError
+from nmm.base.text_format import listed
 from nmm.cli.groups import Figures, command
 from nmm.cli.interrupts import shielded
 from nmm.cli.options import SetOption, flag, option, out_option, values_of
 from nmm.cli.output import OK, progress, show_table, show_text, warn
-from nmm.errors import InputError
-from nmm.text_format import listed
 
 if TYPE_CHECKING:
     from nmm.dynamics.torques import Torques

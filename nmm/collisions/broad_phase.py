@@ -3,9 +3,17 @@
 import math
 from typing import NamedTuple
 
-from nmm.arrays import Array, Integers
-from nmm.kernels.compiled import compiled, scratch
-from nmm.kernels.record_layout import Cell, IntegerCell, IntegerMatrix, IntegerVector, Matrix, Vector, views
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import compiled, scratch
+from nmm.base.kernels.record_layout import (
+    Cell,
+    IntegerCell,
+    IntegerMatrix,
+    IntegerVector,
+    Matrix,
+    Vector,
+    views,
+)
 
 
 class PairArrays(NamedTuple):

@@ -13,13 +13,13 @@ an arc or a straight line of the base while the arm moves straight in its coordi
 import math
 from typing import NamedTuple
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import clear, compiled, scratch
+from nmm.base.kernels.kinematics import Joints, axes, compose, moved, place_joints
+from nmm.base.kernels.linear_algebra import copied, dot, norm
+from nmm.base.kernels.record_layout import IntegerCell, IntegerVector, Matrix, Vector, views
+from nmm.base.kernels.velocity_map import place_mimic_joints
 from nmm.collisions.separation import ConvexShapes, extreme, separation
-from nmm.kernels.compiled import clear, compiled, scratch
-from nmm.kernels.kinematics import Joints, axes, compose, moved, place_joints
-from nmm.kernels.linear_algebra import copied, dot, norm
-from nmm.kernels.record_layout import IntegerCell, IntegerVector, Matrix, Vector, views
-from nmm.kernels.velocity_map import place_mimic_joints
 
 #: Pairs within this beyond their distance count as too near, m: else motions along a wall take looks without
 #: end.

@@ -7,13 +7,13 @@ import numpy as np
 import pinocchio as pin
 from numba import types
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import checked_by_caller, compiled
+from nmm.base.kernels.record_layout import BLOCKS, Blocks, Memory, views
 from nmm.collisions.legs_check import MARGIN, MovedShapes, first_blocked, too_near
 from nmm.collisions.queries import Queries
 from nmm.collisions.scene import Scene
 from nmm.collisions.separation import ConvexShapes
-from nmm.kernels.compiled import checked_by_caller, compiled
-from nmm.kernels.record_layout import BLOCKS, Blocks, Memory, views
 from nmm.robots.joint_table import as_row
 from nmm.robots.robot import Robot
 

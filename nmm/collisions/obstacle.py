@@ -11,10 +11,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, array, vector
+from nmm.base.arrays import Array, array, vector
+from nmm.base.errors import InputError, NmmError, RunError, expect, expect_kind, expect_known
+from nmm.base.text_format import one_line
 from nmm.collisions.shapes import Box, Capsule, ConvexMesh, Cylinder, HalfSpace, Hull, Shape, Sphere
-from nmm.errors import InputError, NmmError, RunError, expect, expect_kind, expect_known
-from nmm.text_format import one_line
 
 #: Where a shape is: (3,) its origin, (6,) origin and rotation vector, or (4, 4); m, rad, world axes.
 Placement: TypeAlias = ArrayLike

@@ -11,11 +11,11 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError, expect_known
+from nmm.base.text_format import is_pattern, matching
 from nmm.collisions.shapes import hull
-from nmm.errors import InputError, expect_known
 from nmm.robots.robot import Robot
-from nmm.text_format import is_pattern, matching
 
 #: Two shapes by their numbers.
 Pair = tuple[int, int]

@@ -11,13 +11,13 @@ import numpy as np
 import pinocchio as pin
 from numba import types
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.errors import NmmError
+from nmm.base.kernels.compiled import checked_by_caller, compiled
+from nmm.base.kernels.record_layout import BLOCKS, Blocks, Memory, views
 from nmm.collisions.broad_phase import PairArrays, find_near
 from nmm.collisions.obstacle import Obstacle
 from nmm.collisions.rows import Rows, write_row, write_rows
-from nmm.errors import NmmError
-from nmm.kernels.compiled import checked_by_caller, compiled
-from nmm.kernels.record_layout import BLOCKS, Blocks, Memory, views
 from nmm.robots.joint_table import placement_rows
 from nmm.robots.robot import Robot
 

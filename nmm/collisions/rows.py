@@ -8,10 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nmm.arrays import Array
-from nmm.collisions.broad_phase import PairArrays, to_world
-from nmm.kernels.compiled import clear, compiled, scratch
-from nmm.kernels.record_layout import (
+from nmm.base.arrays import Array
+from nmm.base.kernels.compiled import clear, compiled, scratch
+from nmm.base.kernels.record_layout import (
     Blocks,
     IntegerCell,
     SampledIntegerCell,
@@ -20,7 +19,8 @@ from nmm.kernels.record_layout import (
     SampledVector,
     views,
 )
-from nmm.kernels.rotations import cross3
+from nmm.base.kernels.rotations import cross3
+from nmm.collisions.broad_phase import PairArrays, to_world
 
 #: A corner belongs to a face or an edge along the other shape if it is behind that plane by at most this
 #: share of its distance from the nearest point plus this length, m, and by at most the third number.

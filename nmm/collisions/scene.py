@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError, RobotError, few
 from nmm.collisions.obstacle import Obstacle
 from nmm.collisions.pairs import always_near, link_names, named_pairs, own_shapes, touching
 from nmm.collisions.queries import Queries
 from nmm.collisions.shapes import HalfSpace
-from nmm.errors import InputError, RobotError, few
 from nmm.robots.loading.srdf import read_srdf
 from nmm.robots.loading.srdf_fitting import disabled_pairs
 from nmm.robots.robot import Robot

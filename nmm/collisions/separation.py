@@ -8,9 +8,9 @@ wrongly.
 import math
 from typing import NamedTuple
 
-from nmm.arrays import Array
-from nmm.kernels.compiled import compiled, scratch
-from nmm.kernels.record_layout import IntegerCell, IntegerMatrix, IntegerVector, Matrix, Vector
+from nmm.base.arrays import Array
+from nmm.base.kernels.compiled import compiled, scratch
+from nmm.base.kernels.record_layout import IntegerCell, IntegerMatrix, IntegerVector, Matrix, Vector
 
 #: Rounds of the algorithm; it ends before where the bound is within `CLOSE` of the distance, as a share of
 #: it.

@@ -16,11 +16,11 @@ import coal
 import numpy as np
 import platformdirs
 
-from nmm import disk_cache
-from nmm.arrays import Array, Integers, array, nonzero_vector, positive, vector
-from nmm.errors import InputError, expect
+from nmm.base import disk_cache
+from nmm.base.arrays import Array, Integers, array, nonzero_vector, positive, vector
+from nmm.base.errors import InputError, expect
+from nmm.base.text_format import one_line
 from nmm.robots.mesh_files import mesh_arrays
-from nmm.text_format import one_line
 
 #: A hull is flat where its volume is below this share of its longest edge cubed.
 FLAT = 1e-9

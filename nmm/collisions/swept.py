@@ -7,12 +7,11 @@ direction between nearest points, carried along with either shape, often suffice
 import math
 from typing import NamedTuple
 
-from nmm.arrays import Array
-from nmm.collisions.broad_phase import PairArrays
-from nmm.kernels.compiled import clear, compiled, scratch
-from nmm.kernels.kinematics import Joints, compose, place_joints
-from nmm.kernels.linear_algebra import copied
-from nmm.kernels.record_layout import (
+from nmm.base.arrays import Array
+from nmm.base.kernels.compiled import clear, compiled, scratch
+from nmm.base.kernels.kinematics import Joints, compose, place_joints
+from nmm.base.kernels.linear_algebra import copied
+from nmm.base.kernels.record_layout import (
     Blocks,
     Cell,
     IntegerCell,
@@ -22,6 +21,7 @@ from nmm.kernels.record_layout import (
     Vector,
     views,
 )
+from nmm.collisions.broad_phase import PairArrays
 from nmm.robots.zero_order_hold import Inputs, hold
 
 #: Two looks are no farther apart than this, in m and rad of the coordinates together.

@@ -8,12 +8,12 @@ import coal
 import numpy as np
 from numba import types
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.kernels.compiled import checked_by_caller
+from nmm.base.kernels.record_layout import BLOCKS, Memory, views
 from nmm.collisions import swept
 from nmm.collisions.queries import Queries
 from nmm.collisions.swept import BRAKING, DRIVEN, LOOKS, SweptMotion
-from nmm.kernels.compiled import checked_by_caller
-from nmm.kernels.record_layout import BLOCKS, Memory, views
 from nmm.robots.joint_table import as_row
 from nmm.robots.zero_order_hold import inputs_of
 

@@ -20,7 +20,10 @@ from __future__ import annotations
 
 import math
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import compiled, kernel, scratch
+from nmm.base.kernels.linear_algebra import dot
+from nmm.base.kernels.record_layout import views
 from nmm.control.bounds import OFF, approach, bound_inputs, brakings, wheel_rows
 from nmm.control.equations import (
     BOUNDS,
@@ -34,9 +37,6 @@ from nmm.control.equations import (
     write_problem,
 )
 from nmm.functions.program import BESIDE, LaidOut, run_stages
-from nmm.kernels.compiled import compiled, kernel, scratch
-from nmm.kernels.linear_algebra import dot
-from nmm.kernels.record_layout import views
 
 #: A row whose second difference is beyond this share of 1 + its size jumps.
 JUMPED = 1e-4

@@ -5,7 +5,10 @@ A step calls this code by its address, so it is compiled only where something is
 
 import math
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import clear, kernel, scratch
+from nmm.base.kernels.linear_algebra import copied
+from nmm.base.kernels.record_layout import views
 from nmm.control.bounds import (
     OFF,
     SAMPLE,
@@ -17,9 +20,6 @@ from nmm.control.bounds import (
 )
 from nmm.control.equations import BOUNDS, ControlStep, times_S
 from nmm.functions.program import BESIDE, LaidOut
-from nmm.kernels.compiled import clear, kernel, scratch
-from nmm.kernels.linear_algebra import copied
-from nmm.kernels.record_layout import views
 
 
 @kernel(BOUNDS)

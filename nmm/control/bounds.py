@@ -14,10 +14,9 @@ brake: n·J S u >= -speed - ∂d/∂t.
 import math
 from typing import NamedTuple
 
-from nmm.arrays import Array
-from nmm.collisions.rows import Rows
-from nmm.kernels.compiled import clear, compiled
-from nmm.kernels.record_layout import (
+from nmm.base.arrays import Array
+from nmm.base.kernels.compiled import clear, compiled
+from nmm.base.kernels.record_layout import (
     Cell,
     IntegerCell,
     IntegerVector,
@@ -28,6 +27,7 @@ from nmm.kernels.record_layout import (
     SampledVector,
     Vector,
 )
+from nmm.collisions.rows import Rows
 from nmm.resolvers.problem_arrays import LOWER, UPPER, ProblemArrays
 from nmm.robots.wheel_rates import rolling
 

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import counted, positive, scalar
+from nmm.base.arrays import counted, positive, scalar
+from nmm.base.errors import InputError, expect_kind, expect_known
 from nmm.collisions.obstacle import Obstacle
 from nmm.collisions.pairs import CAPSULES, HULLS
 from nmm.collisions.scene import Scene, set_up
-from nmm.errors import InputError, expect_kind, expect_known
 from nmm.robots.robot import Robot
 
 #: Pairs within the distance to keep plus this are considered, m.

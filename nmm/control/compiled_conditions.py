@@ -7,14 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from nmm.arrays import Array, Flags, Integers
+from nmm.base.arrays import Array, Flags, Integers
+from nmm.base.kernels.compiled import compiled, compiled_without_gil, scratch, view
+from nmm.base.kernels.record_layout import IntegerMatrix, IntegerVector, Matrix, record_type, views
 from nmm.control.equations import WRAPPED
 from nmm.control.task_rows import error_row
 from nmm.functions.program import LaidOut, run_program
 from nmm.functions.tasks.conditions import After, Between, Condition
 from nmm.functions.tasks.task import Task
-from nmm.kernels.compiled import compiled, compiled_without_gil, scratch, view
-from nmm.kernels.record_layout import IntegerMatrix, IntegerVector, Matrix, record_type, views
 from nmm.robots.robot import Robot
 
 #: Times that differ by less are equal, s.

@@ -10,7 +10,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, positive, scalar, vector
+from nmm.base.arrays import Array, positive, scalar, vector
+from nmm.base.errors import InputError
+from nmm.base.kernels.compiled import checked_by_caller
+from nmm.base.text_format import listed
 from nmm.control.collisions import Collisions
 from nmm.control.idle_inputs import idle_inputs, inputs_without_effect
 from nmm.control.integrators import STEPPING, integrator
@@ -25,15 +28,12 @@ from nmm.control.step import Step
 from nmm.control.step_layout import SERVO, Given, checked
 from nmm.control.step_solver import FAILED, StepSolver
 from nmm.control.stepping import ADVANCE, advance, tableau
-from nmm.errors import InputError
 from nmm.functions.function import Row
 from nmm.functions.objectives.base import Objective
 from nmm.functions.program import PINOCCHIO, nothing
 from nmm.functions.tasks.task import Stack, Task
-from nmm.kernels.compiled import checked_by_caller
 from nmm.resolvers.base import Resolver
 from nmm.robots.robot import Robot
-from nmm.text_format import listed
 
 FLOAT64 = np.dtype(np.float64)
 

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array
-from nmm.findings import Finding
+from nmm.base.arrays import Array
+from nmm.base.findings import Finding
+from nmm.base.text_format import signed_sum
 from nmm.functions.function import Function, Row, row_scales
 from nmm.functions.tasks.pose import Orientation, Pose
 from nmm.functions.tasks.task import Stack
@@ -17,7 +18,6 @@ from nmm.resolvers.answer import Status
 from nmm.resolvers.problem_arrays import ProblemArrays
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
-from nmm.text_format import signed_sum
 
 #: Singular values this small beside the largest are zero.
 TOLERANCE = 1e-10

@@ -10,17 +10,10 @@ from typing import NamedTuple
 
 from numba import types
 
-from nmm.arrays import Array, Integers
-from nmm.collisions.rows import Rows
-from nmm.control.bounds import SAMPLE, Clearance, LimitNumbers, gathers_speed
-from nmm.control.period_monitor import PeriodNumbers
-from nmm.control.retreat import RetreatNumbers, stalls
-from nmm.control.steering import SteeringNumbers, steer
-from nmm.control.step_records import SecondOrder, TaskRows
-from nmm.functions.program import BESIDE, Buffers, LaidOut, run_program
-from nmm.kernels.compiled import caller, compiled, kernel, scratch
-from nmm.kernels.linear_algebra import dot, residual_norm
-from nmm.kernels.record_layout import (
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import caller, compiled, kernel, scratch
+from nmm.base.kernels.linear_algebra import dot, residual_norm
+from nmm.base.kernels.record_layout import (
     Cell,
     IntegerVector,
     SampledIntegerVector,
@@ -28,7 +21,14 @@ from nmm.kernels.record_layout import (
     Vector,
     views,
 )
-from nmm.kernels.velocity_map import to_coordinates, to_inputs
+from nmm.base.kernels.velocity_map import to_coordinates, to_inputs
+from nmm.collisions.rows import Rows
+from nmm.control.bounds import SAMPLE, Clearance, LimitNumbers, gathers_speed
+from nmm.control.period_monitor import PeriodNumbers
+from nmm.control.retreat import RetreatNumbers, stalls
+from nmm.control.steering import SteeringNumbers, steer
+from nmm.control.step_records import SecondOrder, TaskRows
+from nmm.functions.program import BESIDE, Buffers, LaidOut, run_program
 from nmm.resolvers.answer import NOT_FINITE, RELAXED, SINGULAR_J, SOLVED, AnswerArrays
 from nmm.resolvers.base import call_resolver
 from nmm.resolvers.limit_check import keep_limits
@@ -40,7 +40,7 @@ class Arm(NamedTuple):
     """C of S = blkdiag(G, C): the identity, with a further row for each mimic joint.
 
     moved (m - p,) : the coordinate that input p + j moves
-    mimic_joints (4 k,) : see `nmm.kernels.velocity_map`
+    mimic_joints (4 k,) : see `nmm.base.kernels.velocity_map`
     """
 
     moved: IntegerVector

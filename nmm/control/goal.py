@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nmm.arrays import Array, Integers, positive
+from nmm.base.arrays import Array, Integers, positive
+from nmm.base.kernels.compiled import inlined
 from nmm.functions.function import Row
-from nmm.kernels.compiled import inlined
 
 
 class Goal:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.control.step_solver import StepSolver
 from nmm.functions.objectives.base import Product
 from nmm.functions.program import evaluate

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array
-from nmm.errors import RunError, expect_known
-from nmm.kernels.compiled import allocating
+from nmm.base.arrays import Array
+from nmm.base.errors import RunError, expect_known
+from nmm.base.kernels.compiled import allocating
 from nmm.robots.robot import Robot
 from nmm.robots.zero_order_hold import HeldInputs
 

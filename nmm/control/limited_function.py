@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import counted, infinite, positive
-from nmm.errors import InputError, expect, expect_kind, few
+from nmm.base.arrays import counted, infinite, positive
+from nmm.base.errors import InputError, expect, expect_kind, few
 from nmm.functions.function import Function
 from nmm.robots.robot import Robot
 

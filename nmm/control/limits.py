@@ -7,10 +7,10 @@ from typing import TypeAlias
 
 import numpy as np
 
-from nmm.arrays import Array, positive
+from nmm.base.arrays import Array, positive
+from nmm.base.errors import InputError, expect_kind, expect_known, one_or_several
 from nmm.control.bounds import SAMPLE, LimitNumbers
 from nmm.control.limited_function import Bound, Kept
-from nmm.errors import InputError, expect_kind, expect_known, one_or_several
 from nmm.functions.tasks.linear_coordinates import LinearCoordinates
 from nmm.robots.coordinates import UNLIMITED
 from nmm.robots.robot import Robot

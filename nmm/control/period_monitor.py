@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from nmm.kernels.record_layout import SampledCell, SampledIntegerCell
+from nmm.base.kernels.record_layout import SampledCell, SampledIntegerCell
 
 #: Calls more than this many dt apart are late.
 LATE = 1.1

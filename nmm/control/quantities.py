@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import Array, Integers
-from nmm.errors import expect_known
-from nmm.kernels.spectra import spectra
+from nmm.base.arrays import Array, Integers
+from nmm.base.errors import expect_known
+from nmm.base.kernels.spectra import spectra
 from nmm.robots.robot import Robot
 
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeAlias
 import numpy as np
 from numba import types
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import call_platform, checked_by_caller, clear, compiled, scratch, view
+from nmm.base.kernels.linear_algebra import dot
+from nmm.base.kernels.record_layout import Blocks, Kind, record_type, views
 from nmm.control.equations import ControlStep, drive
 from nmm.control.quantities import QUANTITIES
 from nmm.functions.program import BESIDE, LaidOut
-from nmm.kernels.compiled import call_platform, checked_by_caller, clear, compiled, scratch, view
-from nmm.kernels.linear_algebra import dot
-from nmm.kernels.record_layout import Blocks, Kind, record_type, views
 from nmm.resolvers.answer import FALLBACK, added_residual
 from nmm.resolvers.partitions import COLUMNS
 

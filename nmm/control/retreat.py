@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, positive, scalar
+from nmm.base.arrays import Array, positive, scalar
+from nmm.base.errors import InputError
+from nmm.base.kernels.compiled import compiled
+from nmm.base.kernels.record_layout import Cell, IntegerVector, SampledCell, SampledIntegerCell, Vector
 from nmm.control.goal import METRES, Goal, norms, unit_codes
-from nmm.errors import InputError
 from nmm.functions.function import Row
-from nmm.kernels.compiled import compiled
-from nmm.kernels.record_layout import Cell, IntegerVector, SampledCell, SampledIntegerCell, Vector
 from nmm.resolvers.problem_arrays import ProblemArrays
 from nmm.robots.robot import Robot
 

@@ -10,10 +10,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TypeAlias
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.record_layout import Blocks, sampled
 from nmm.control.bounds import LimitNumbers
 from nmm.control.equations import ControlStep
-from nmm.kernels.record_layout import Blocks, sampled
 
 #: Copies of the integers and floats that a sample changes.
 Snapshot: TypeAlias = tuple[Integers, Array]

@@ -8,15 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError, expect, expect_known
+from nmm.base.findings import Finding
+from nmm.base.kernels.compiled import checked_by_caller
 from nmm.control.compiled_conditions import LOOK, WATCH, conditions, look, watch
 from nmm.control.task_rows import task_functions
-from nmm.errors import InputError, expect, expect_known
-from nmm.findings import Finding
 from nmm.functions.program import COMPILED, Program
 from nmm.functions.tasks.conditions import After, Between, Condition, While
 from nmm.functions.tasks.task import Stack
-from nmm.kernels.compiled import checked_by_caller
 from nmm.robots.robot import Robot
 
 

@@ -7,7 +7,9 @@ from collections.abc import Sequence as Several
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError, RunError
+from nmm.base.text_format import listed
 from nmm.control.collisions import Collisions
 from nmm.control.controller import Controller
 from nmm.control.limits import Limits
@@ -16,7 +18,6 @@ from nmm.control.sequence import Event, Moment, Schedule, Sequence
 from nmm.control.steering import Steering
 from nmm.control.step_layout import SERVO, Given, checked
 from nmm.control.step_solver import StepSolver
-from nmm.errors import InputError, RunError
 from nmm.functions.objectives.base import Objective
 from nmm.functions.program import PINOCCHIO
 from nmm.functions.references import Constant
@@ -25,7 +26,6 @@ from nmm.resolvers.base import Resolver
 from nmm.resolvers.callable_resolver import CallableResolver
 from nmm.resolvers.problem import Problem
 from nmm.robots.robot import Robot
-from nmm.text_format import listed
 
 
 class SequencedController(Controller):

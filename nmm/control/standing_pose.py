@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.findings import Finding
 from nmm.control.step_solver import StepSolver
-from nmm.findings import Finding
 from nmm.functions.program import evaluate
 from nmm.robots.configuration import Configuration
 

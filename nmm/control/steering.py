@@ -18,12 +18,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nmm.arrays import Array, positive, scalar
+from nmm.base.arrays import Array, positive, scalar
+from nmm.base.kernels.compiled import compiled
+from nmm.base.kernels.linear_algebra import dot
+from nmm.base.kernels.record_layout import Cell, IntegerCell, IntegerVector, Vector
 from nmm.functions.pursuit import Pursuit
 from nmm.functions.tasks.task import Task
-from nmm.kernels.compiled import compiled
-from nmm.kernels.linear_algebra import dot
-from nmm.kernels.record_layout import Cell, IntegerCell, IntegerVector, Vector
 from nmm.platforms.base import Platform
 from nmm.platforms.steering import SteeringPivot
 from nmm.resolvers.problem_arrays import ProblemArrays

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.errors import expect_known
 from nmm.control.quantities import QUANTITIES, Record
-from nmm.errors import expect_known
 from nmm.resolvers.answer import Status
 from nmm.robots.robot import Robot
 

@@ -4,7 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nmm.arrays import positive
+from nmm.base.arrays import positive
+from nmm.base.errors import InputError, expect_kind, expect_known
+from nmm.base.kernels.parallel_compile import compile_in_parallel
+from nmm.base.kernels.record_layout import views
 from nmm.collisions.rows import no_rows
 from nmm.control.acceleration import accelerate, write_next_limits
 from nmm.control.bounded_step import write_clearance, write_limits
@@ -19,13 +22,10 @@ from nmm.control.safety_filter import CUTS, MARGIN, Counts
 from nmm.control.steering import NOTHING, Steered, Steering
 from nmm.control.step_records import SecondOrder, TaskRows
 from nmm.control.task_rows import task_functions, task_rows
-from nmm.errors import InputError, expect_kind, expect_known
 from nmm.functions.function import Function, row_scales
 from nmm.functions.objectives.base import Objective
 from nmm.functions.program import BESIDE, COMPILED, PINOCCHIO, Buffers, Program
 from nmm.functions.tasks.task import Stack
-from nmm.kernels.parallel_compile import compile_in_parallel
-from nmm.kernels.record_layout import views
 from nmm.resolvers.answer import unanswered
 from nmm.resolvers.base import Resolver, State
 from nmm.resolvers.problem import Dimensions, Problem

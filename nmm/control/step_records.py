@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from nmm.base.kernels.record_layout import Cell, IntegerMatrix, IntegerVector, Matrix, Vector
 from nmm.functions.program import Buffers
-from nmm.kernels.record_layout import Cell, IntegerMatrix, IntegerVector, Matrix, Vector
 
 
 class TaskRows(NamedTuple):

@@ -17,14 +17,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from nmm.arrays import Array, Integers
-from nmm.control.equations import ControlStep, resolve
-from nmm.errors import InputError
-from nmm.functions.function import Function
-from nmm.functions.program import BESIDE, COMPILED, Buffers, LaidOut, Program, run_program
-from nmm.kernels.compiled import caller, checked_by_caller, clear, compiled, kernel
-from nmm.kernels.linear_algebra import add, copied
-from nmm.kernels.record_layout import (
+from nmm.base.arrays import Array, Integers
+from nmm.base.errors import InputError
+from nmm.base.kernels.compiled import caller, checked_by_caller, clear, compiled, kernel
+from nmm.base.kernels.linear_algebra import add, copied
+from nmm.base.kernels.record_layout import (
     Blocks,
     Cell,
     IntegerCell,
@@ -35,6 +32,9 @@ from nmm.kernels.record_layout import (
     sampled,
     views,
 )
+from nmm.control.equations import ControlStep, resolve
+from nmm.functions.function import Function
+from nmm.functions.program import BESIDE, COMPILED, Buffers, LaidOut, Program, run_program
 from nmm.resolvers.answer import SINGULAR_J
 from nmm.resolvers.base import Resolver
 from nmm.robots.robot import Robot

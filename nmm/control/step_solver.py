@@ -14,7 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import Array, positive, scalar
+from nmm.base.arrays import Array, positive, scalar
+from nmm.base.errors import InputError, RunError, SingularError
+from nmm.base.kernels.compiled import checked_by_caller
+from nmm.base.kernels.record_layout import Blocks
 from nmm.collisions.scene import Scene
 from nmm.control.acceleration import (
     AHEAD,
@@ -41,11 +44,8 @@ from nmm.control.step import Step
 from nmm.control.step_layout import Given, lay_out
 from nmm.control.step_size import StepSize
 from nmm.control.stepping import write_errors
-from nmm.errors import InputError, RunError, SingularError
 from nmm.functions.function import Row
 from nmm.functions.program import nothing
-from nmm.kernels.compiled import checked_by_caller
-from nmm.kernels.record_layout import Blocks
 from nmm.resolvers.answer import Status
 from nmm.resolvers.base import Resolver, State
 

@@ -7,15 +7,15 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import compiled, compiled_without_gil, integer_scratch, scratch, view
+from nmm.base.kernels.linear_algebra import copied
+from nmm.base.kernels.record_layout import Matrix, Vector, keep, kept, put_back, record_type, views
+from nmm.base.kernels.velocity_map import place_mimic_joints
 from nmm.control.bounds import SAMPLE, STAGE
 from nmm.control.equations import ControlStep, call_step, write_equation
 from nmm.control.integrators import MIDPOINT, Integrator, RungeKutta, WithMimicJoints, ZeroOrderHold
 from nmm.functions.program import BESIDE, LaidOut, run_program
-from nmm.kernels.compiled import compiled, compiled_without_gil, integer_scratch, scratch, view
-from nmm.kernels.linear_algebra import copied
-from nmm.kernels.record_layout import Matrix, Vector, keep, kept, put_back, record_type, views
-from nmm.kernels.velocity_map import place_mimic_joints
 from nmm.resolvers.answer import SINGULAR_J, SOLVED
 from nmm.robots.zero_order_hold import Inputs, hold_rates
 

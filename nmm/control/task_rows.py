@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
 from nmm.control.equations import PLAIN, WRAPPED, TaskRows
 from nmm.functions.function import Function, Row
 from nmm.functions.tasks.task import Comparison, Stack, Task

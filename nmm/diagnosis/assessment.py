@@ -8,16 +8,16 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.errors import RunError
+from nmm.base.kernels.compiled import checked_by_caller, compiled_without_gil, scratch
+from nmm.base.kernels.record_layout import views
 from nmm.control.controller import Controller
 from nmm.control.equations import ControlStep, call_step
 from nmm.control.integrators import Integrator
 from nmm.diagnosis.error_bound import ENDS, Departure, Samples, adaptive_errors, decay, departure, step_errors
-from nmm.errors import RunError
 from nmm.functions.callbacks import DIFFERENCE_STEP
 from nmm.functions.program import BESIDE
-from nmm.kernels.compiled import checked_by_caller, compiled_without_gil, scratch
-from nmm.kernels.record_layout import views
 from nmm.resolvers.answer import SINGULAR_J
 from nmm.resolvers.base import State
 from nmm.resolvers.partitions import HELD, MODE, PartitionState

@@ -21,9 +21,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from nmm.arrays import Array, Flags, Integers
+from nmm.base.arrays import Array, Flags, Integers
+from nmm.base.kernels.compiled import compiled, kernel, view
 from nmm.control.task_rows import gain_rows
-from nmm.kernels.compiled import compiled, kernel, view
 from nmm.runs.recording import Recorder
 from nmm.runs.residuals import differs
 

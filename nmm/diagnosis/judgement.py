@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from nmm.base.findings import Finding
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.diagnosis import reasons
 from nmm.diagnosis.assessment import Assessment, Instability, assess
 from nmm.diagnosis.error_bound import Departure, Samples
 from nmm.diagnosis.jumps import chattering, crossings, moving_otherwise
-from nmm.findings import Finding
 from nmm.robots.wheel_slip import sideways_speeds
 from nmm.runs.leg import Leg
 from nmm.runs.recorded_run import record_run, sample_times

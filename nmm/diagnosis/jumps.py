@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import Array, Flags, Integers
-from nmm.findings import Finding
+from nmm.base.arrays import Array, Flags, Integers
+from nmm.base.findings import Finding
 from nmm.runs.recording import crossed
 
 #: So many jumps in a row, each back from the last: fewer are a switch of partition, or a swing.

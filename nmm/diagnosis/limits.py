@@ -5,19 +5,19 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.findings import Finding
+from nmm.base.text_format import listed
 from nmm.collisions.scene import Scene
 from nmm.control.controller import Controller
 from nmm.control.limits import LimitsOn
 from nmm.control.safety_filter import Counts
-from nmm.findings import Finding
 from nmm.robots.robot import Robot
 from nmm.robots.wheel_rates import turning_wheels
 from nmm.runs.clearance import ROUNDING, Swept
 from nmm.runs.margins import standing
 from nmm.runs.recording import Recorder
 from nmm.runs.trajectory import Trajectory
-from nmm.text_format import listed
 
 #: Exceeding a limit by less than this part of it is rounding.
 SLACK = 1e-6

@@ -7,8 +7,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from nmm.errors import InputError
-from nmm.findings import Finding
+from nmm.base.errors import InputError
+from nmm.base.findings import Finding
 
 if TYPE_CHECKING:
     from nmm.dynamics.torques import Torques

@@ -4,11 +4,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.findings import Finding
 from nmm.control.controller import Controller
 from nmm.control.directions import WORLD_PARTS, in_world_axes, lost_directions, weakest_direction
 from nmm.diagnosis.error_bound import Departure, Samples
-from nmm.findings import Finding
 from nmm.functions.function import Row, row_scales
 from nmm.resolvers.damped_least_squares import DampedLeastSquares
 from nmm.robots.configuration import Configuration

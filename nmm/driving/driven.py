@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import NmmError, expect
 from nmm.collisions.obstacle import Obstacle
 from nmm.control.controller import Controller
 from nmm.control.step import Step
 from nmm.diagnosis.reasons import out_of_reach, stretched
 from nmm.driving.setups import Choice, DriveSetup, Settings, aimed, named, targets_of
 from nmm.driving.things import Thing, Things
-from nmm.errors import NmmError, expect
 from nmm.functions.program import evaluate
 from nmm.playback.rolling import RolledRobot
 from nmm.robots.configuration import Configuration

@@ -11,12 +11,12 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import NmmError
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.driving.driven import Driven
 from nmm.driving.setups import led_by
-from nmm.errors import NmmError
 from nmm.functions.references import Constant
 from nmm.functions.references.live_target import LiveTarget
 from nmm.functions.tasks.task import Task

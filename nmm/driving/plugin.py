@@ -1,6 +1,6 @@
 """The plugin with live pages: runs played, robots seen and driven in a browser, and videos."""
 
-from nmm.plugins import Plugin
+from nmm.base.plugins import Plugin
 
 PLUGIN = Plugin(
     "live",

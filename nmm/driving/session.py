@@ -15,17 +15,17 @@ import numpy as np
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
-from nmm.arrays import finite
+from nmm.base.arrays import finite
+from nmm.base.errors import InputError, NmmError
+from nmm.base.resolver_style import looks
 from nmm.driving.driven import Driven, Look, Made
 from nmm.driving.planning import Planning, later, why
 from nmm.driving.setups import Choice, DriveSetup, named
-from nmm.errors import InputError, NmmError
 from nmm.playback.cameras import live_numbers
 from nmm.playback.channels import live_channels
 from nmm.playback.drawing import Drawing, encode
 from nmm.playback.server import Visitor
 from nmm.playback.session import FPS, RobotSession
-from nmm.resolver_style import looks
 from nmm.robots.motion import Camera
 from nmm.runs.components import Axes
 from nmm.runs.seen import SeenPoints

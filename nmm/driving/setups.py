@@ -12,15 +12,15 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError, NmmError, expect, expect_kind, expect_known
+from nmm.base.kinds import RESOLVERS
 from nmm.control.controller import Controller
 from nmm.control.limits import Limits
-from nmm.errors import InputError, NmmError, expect, expect_kind, expect_known
 from nmm.functions.function import Function
 from nmm.functions.program import evaluate
 from nmm.functions.references.live_target import LiveTarget
 from nmm.functions.tasks.task import Stack, Task
-from nmm.kinds import RESOLVERS
 from nmm.resolvers.base import Resolver
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.control.controller import Controller
 from nmm.functions.function import Function, Sight
 from nmm.functions.program import evaluate

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.robots.robot import Robot
 from nmm.robots.wheel_rates import wheel_shares
 

@@ -8,9 +8,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, array, positive, vector
+from nmm.base.arrays import Array, array, positive, vector
+from nmm.base.errors import InputError, expect, no_such
 from nmm.dynamics.actuators import Actuators
-from nmm.errors import InputError, expect, no_such
 from nmm.robots.robot import Robot, frame_index
 from nmm.robots.wheel_rates import (
     following,

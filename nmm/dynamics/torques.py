@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nmm.arrays import Array, Flags
+from nmm.base.arrays import Array, Flags
+from nmm.base.findings import Finding
+from nmm.base.lazy_call import lazy_call
 from nmm.dynamics.dynamics import Dynamics, Payload
 from nmm.dynamics.support import Support
-from nmm.findings import Finding
-from nmm.lazy_call import lazy_call
 from nmm.robots.robot import Robot
 
 if TYPE_CHECKING:

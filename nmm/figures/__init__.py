@@ -7,7 +7,7 @@ if os.environ.get("MATPLOTLIBRC") == os.devnull:  # then it would take those tha
     with chdir(os.sep):
         import matplotlib  # noqa: F401  # reads its settings now, where none of the user's lie
 
-from nmm.figure_options import FigureOptions
+from nmm.base.figure_options import FigureOptions
 from nmm.figures.composed import comparison, overview, write_run_figures
 from nmm.figures.curves import coordinates, errors, inputs, singular_values, tracking
 from nmm.figures.limits import clearance, limits

@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from nmm import resolver_style
-from nmm.arrays import Array
+from nmm.base import resolver_style
+from nmm.base.arrays import Array
+from nmm.base.ellipsoid_options import Wanted
+from nmm.base.figure_options import PLAIN, FigureOptions
 from nmm.diagnosis.summary import BAND, settling_time
-from nmm.ellipsoid_options import Wanted
-from nmm.figure_options import PLAIN, FigureOptions
 from nmm.figures import curves, style
 from nmm.figures.limits import clearance, draw_scale, has_clearance, has_limits, limits
 from nmm.figures.motion import Scene, stroboscopic

@@ -8,7 +8,6 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
-from nmm import resolver_style
 from nmm.analysis.singular.ellipsoids import (
     NAMES,
     SHARE,
@@ -19,8 +18,9 @@ from nmm.analysis.singular.ellipsoids import (
     scale_text,
 )
 from nmm.analysis.singular.parts import WHOLE
-from nmm.arrays import Array
-from nmm.ellipsoid_options import EllipsoidOptions, Wanted, options_of
+from nmm.base import resolver_style
+from nmm.base.arrays import Array
+from nmm.base.ellipsoid_options import EllipsoidOptions, Wanted, options_of
 from nmm.figures import style
 from nmm.figures.silhouette import Ink, Silhouette
 from nmm.figures.style import save

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from nmm import resolver_style
+from nmm.base import resolver_style
 from nmm.figures import style
 from nmm.robots.wheel_rates import wheel_rates
 from nmm.runs.trajectory import Trajectory

@@ -13,17 +13,17 @@ from matplotlib.image import AxesImage
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
-from nmm import resolver_style
 from nmm.analysis.maps.measures import MEASURES
 from nmm.analysis.maps.result import EVERYWHERE, Map
 from nmm.analysis.maps.singular_set import SingularSet
-from nmm.arrays import Array
-from nmm.errors import expect_known
+from nmm.base import resolver_style
+from nmm.base.arrays import Array
+from nmm.base.errors import expect_known
+from nmm.base.text_format import fraction_of_pi
 from nmm.figures import style
 from nmm.figures.silhouette import Silhouette, hull
 from nmm.figures.style import save
 from nmm.figures.views import View
-from nmm.text_format import fraction_of_pi
 
 #: Even steps of the value are even steps to the eye, also to colour-blind ones.
 COLORS = "viridis"

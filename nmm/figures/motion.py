@@ -10,9 +10,9 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from nmm import resolver_style
-from nmm.arrays import Array
-from nmm.errors import expect
+from nmm.base import resolver_style
+from nmm.base.arrays import Array
+from nmm.base.errors import expect
 from nmm.figures import style
 from nmm.figures.seen_points import SeenPoints, few
 from nmm.figures.silhouette import Ink, Pose, Silhouette, hull, outline_points

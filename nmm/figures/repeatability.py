@@ -5,10 +5,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from nmm import resolver_style
 from nmm.analysis.redundancy.laps import Laps, Repeatability
-from nmm.arrays import Array
-from nmm.errors import expect
+from nmm.base import resolver_style
+from nmm.base.arrays import Array
+from nmm.base.errors import expect
 from nmm.figures import style
 
 #: Drifts below this are drawn here: rounding, and exact zeros, which a logarithmic axis has not.

@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from nmm import resolver_style
-from nmm.arrays import Array
+from nmm.base import resolver_style
+from nmm.base.arrays import Array
 from nmm.runs.trajectory import Trajectory
 
 #: Size of the mark of a point that stands, and of where one that moves is at an instant, pt.

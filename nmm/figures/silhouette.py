@@ -12,7 +12,7 @@ import pinocchio as pin
 from matplotlib.axes import Axes
 from matplotlib.collections import Collection, LineCollection, PolyCollection
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.figures.views import ABOVE, View
 from nmm.playback.extent import corners
 from nmm.playback.placements import Placements, joint_screw

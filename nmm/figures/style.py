@@ -16,13 +16,13 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
-from nmm.arrays import Array
-from nmm.errors import expect
-from nmm.figure_options import FORMATS, FigureOptions
-from nmm.files import written_at
-from nmm.resolver_style import BLACK, CYCLE, DASHES, GREEN, ORANGE, PINK, Look
+from nmm.base.arrays import Array
+from nmm.base.errors import expect
+from nmm.base.figure_options import FORMATS, FigureOptions
+from nmm.base.files import written_at
+from nmm.base.resolver_style import BLACK, CYCLE, DASHES, GREEN, ORANGE, PINK, Look
+from nmm.base.text_format import listed, printable, superscript
 from nmm.runs.trajectory import Trajectory
-from nmm.text_format import listed, printable, superscript
 
 GREY, LIGHT = "#6B7280", "#E5E7EB"
 DPI = 180

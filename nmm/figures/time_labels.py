@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nmm.arrays import Array, Flags
+from nmm.base.arrays import Array, Flags
 from nmm.figures import style
 
 #: Size of the text, pt, and what a character and a line take at most, in.

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from nmm import resolver_style
+from nmm.base import resolver_style
 from nmm.dynamics.torques import Torques
 from nmm.figures import style
 

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from nmm import resolver_style
-from nmm.arrays import Array
+from nmm.base import resolver_style
+from nmm.base.arrays import Array
 from nmm.figures import style
 from nmm.figures.seen_points import SeenPoints
 from nmm.playback.placements import base_position

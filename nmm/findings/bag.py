@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import Any
 
-from nmm.findings.finding import Words
-from nmm.text_format import counted, listed
+from nmm.base.findings.finding import Words
+from nmm.base.text_format import counted, listed
 
 _STAMPS = {
     "zero": "has stamps of 0",

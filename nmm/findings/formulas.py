@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import pi
 from typing import Any
 
-from nmm.latex import Formula, Typeset, block, formula, joined, minor_name, sentence, symbol
+from nmm.base.latex import Formula, Typeset, block, formula, joined, minor_name, sentence, symbol
 
 _J, _DET = Formula("J", "J"), Formula("det J J^T", r"\det J J^T")
 _SEARCH = Typeset("--search", r"\texttt{-{}-search}")

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from nmm.findings.finding import Words
-from nmm.text_format import apart, counted
+from nmm.base.findings.finding import Words
+from nmm.base.text_format import apart, counted
 
 _REASONS = {
     "lost": "did not come",

@@ -8,12 +8,12 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nmm.errors import InputError
-from nmm.figure_options import PLAIN, FigureOptions
+from nmm.base.errors import InputError
+from nmm.base.figure_options import PLAIN, FigureOptions
 from nmm.folders.whole import FolderKind, replaced_folder
 
 if TYPE_CHECKING:
-    from nmm.ellipsoid_options import Wanted
+    from nmm.base.ellipsoid_options import Wanted
     from nmm.runs.trajectory import Trajectory
 
 is_comparison = FolderKind("nmm comparison 1")

@@ -3,7 +3,7 @@
 from pathlib import Path
 from pkgutil import resolve_name
 
-from nmm.plugins import additions, complain
+from nmm.base.plugins import additions, complain
 
 #: What recognises a folder's format, "package.module:name", by what the folder is called.
 FOLDERS = {

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nmm.figure_options import PLAIN, FigureOptions
+from nmm.base.figure_options import PLAIN, FigureOptions
 from nmm.folders.whole import FolderKind, replaced_folder
 
 if TYPE_CHECKING:

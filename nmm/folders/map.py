@@ -10,10 +10,10 @@ import numpy as np
 
 from nmm.analysis.maps.measures import MEASURES
 from nmm.analysis.maps.result import EVERYWHERE, Extreme
-from nmm.arrays import Array, Integers, finite
-from nmm.figure_options import PLAIN, FigureOptions
+from nmm.base.arrays import Array, Integers, finite
+from nmm.base.figure_options import PLAIN, FigureOptions
+from nmm.base.machine import made_with
 from nmm.folders.whole import FolderKind, replaced_folder
-from nmm.machine import made_with
 
 if TYPE_CHECKING:
     from nmm.analysis.maps.result import Map

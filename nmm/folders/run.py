@@ -11,18 +11,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import yaml
 
+from nmm.base.errors import InputError, RobotError, expect
+from nmm.base.figure_options import Drawn, drawn_as
 from nmm.collisions.obstacle import obstacle_as_json, obstacle_from_json, obstacle_places, shape_from_json
 from nmm.control.quantities import placed, saved
 from nmm.diagnosis.summary import FORMAT
-from nmm.errors import InputError, RobotError, expect
-from nmm.figure_options import Drawn, drawn_as
 from nmm.folders.whole import FolderKind, replaced_folder, steady
 from nmm.runs.components import components
 from nmm.runs.residuals import Residuals
 
 if TYPE_CHECKING:
+    from nmm.base.ellipsoid_options import Wanted
     from nmm.collisions.obstacle import Obstacle
-    from nmm.ellipsoid_options import Wanted
     from nmm.folders.schema import ToldObstacle, ToldRun
     from nmm.robots.robot import Robot
     from nmm.runs.seen import RunCamera

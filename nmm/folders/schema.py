@@ -9,17 +9,17 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic import BaseModel, ConfigDict, FiniteFloat, PositiveFloat, ValidationError
 
-from nmm.arrays import increasing
+from nmm.base.arrays import increasing
+from nmm.base.errors import InputError, expect
+from nmm.base.files import expect_file, read_bytes
+from nmm.base.machine import SHARE, free_memory
+from nmm.base.text_format import one_line, printable
 from nmm.control.quantities import saved
-from nmm.errors import InputError, expect
-from nmm.files import expect_file, read_bytes
 from nmm.folders.whole import MOST
-from nmm.machine import SHARE, free_memory
 from nmm.runs.residuals import NO_RESIDUALS
 from nmm.runs.trajectory import Outcome
 from nmm.scenario.keys import first_error
 from nmm.scenario.yaml_text import dotted
-from nmm.text_format import one_line, printable
 
 #: Larger values belong to diverged motions, and overflow when drawn.
 LARGEST = 1e30

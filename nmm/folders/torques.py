@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nmm.arrays import finite
-from nmm.figure_options import PLAIN, FigureOptions
+from nmm.base.arrays import finite
+from nmm.base.figure_options import PLAIN, FigureOptions
 from nmm.folders.whole import FolderKind, replaced_folder
 
 if TYPE_CHECKING:

@@ -1,6 +1,6 @@
 """A folder written whole or not at all, which replaces only a folder of the same kind.
 
-It is written in a hidden folder (`nmm.files`), then exchanged atomically. Where the system cannot do that
+It is written in a hidden folder (`nmm.base.files`), then exchanged atomically. Where the system cannot do that
 (Windows, some network file systems), the old folder is moved aside meanwhile; if the writer is killed in that
 moment, the next writer moves it back.
 """
@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from nmm.errors import InputError
-from nmm.files import OLD, PATIENCE, at_work, busy, read_bytes, writing, written_at
-from nmm.machine import made_with
+from nmm.base.errors import InputError
+from nmm.base.files import OLD, PATIENCE, at_work, busy, read_bytes, writing, written_at
+from nmm.base.machine import made_with
 
 Read = TypeVar("Read")
 

@@ -13,12 +13,12 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from nmm.arrays import Array
-from nmm.errors import expect
-from nmm.findings import Finding
-from nmm.kernels.compiled import Kernel, clear, kernel
-from nmm.kernels.linear_algebra import copied
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
+from nmm.base.arrays import Array
+from nmm.base.errors import expect
+from nmm.base.findings import Finding
+from nmm.base.kernels.compiled import Kernel, clear, kernel
+from nmm.base.kernels.linear_algebra import copied
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.configuration import Configuration
 from nmm.robots.motion import NORMALISED
 from nmm.robots.robot import Robot

@@ -9,11 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from nmm.arrays import Array, Integers
-from nmm.functions.function import Callback, Evaluation, Function, Renewal, Stage
-from nmm.kernels.compiled import call_platform, clear, compiled, view
-from nmm.kernels.kinematics import Kinematics, place_frames
-from nmm.kernels.record_layout import (
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import call_platform, clear, compiled, view
+from nmm.base.kernels.kinematics import Kinematics, place_frames
+from nmm.base.kernels.record_layout import (
     BLOCKS,
     Blocks,
     IntegerCell,
@@ -27,7 +26,8 @@ from nmm.kernels.record_layout import (
     header_length,
     views,
 )
-from nmm.kernels.records import At, Frames, Rows, call_function
+from nmm.base.kernels.records import At, Frames, Rows, call_function
+from nmm.functions.function import Callback, Evaluation, Function, Renewal, Stage
 from nmm.robots.configuration import Configuration, kinematics_updater
 from nmm.robots.joint_table import frame_table
 from nmm.robots.robot import CENTER_OF_MASS, Robot
@@ -140,7 +140,7 @@ class Program:
 
     Parameters
     ----------
-    kinematics : PINOCCHIO, in `prepare`, or COMPILED, by `nmm.kernels.kinematics` in `run_program`
+    kinematics : PINOCCHIO, in `prepare`, or COMPILED, by `nmm.base.kernels.kinematics` in `run_program`
 
     Attributes
     ----------

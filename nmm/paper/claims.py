@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.text_format import number_text
 from nmm.paper.cases import Case, Claim, Row
-from nmm.text_format import number_text
 
 if TYPE_CHECKING:
     from nmm.control.controller import Controller

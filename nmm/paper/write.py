@@ -10,15 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nmm import __version__
-from nmm.errors import RunError, expect
-from nmm.figure_options import PLAIN, FigureOptions
+from nmm.base.errors import RunError, expect
+from nmm.base.figure_options import PLAIN, FigureOptions
+from nmm.base.processes import share_out
+from nmm.base.progress import Progress, between
+from nmm.base.templates import template
 from nmm.folders.whole import FolderKind, replaced_folder
 from nmm.paper.cases import CASES, DT, RESOLVERS, Case, CaseResult, Claim
 from nmm.paper.claims import claims, smallest_determinant, table
-from nmm.processes import share_out
-from nmm.progress import Progress, between
 from nmm.runs.trajectory import Outcome, Trajectory
-from nmm.templates import template
 
 if TYPE_CHECKING:
     from nmm.scenario import Scenario

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError, RunError
 from nmm.dynamics.dynamics import Dynamics
-from nmm.errors import InputError, RunError
 from nmm.plans.samples import SampledMotion
 from nmm.plans.timing import TimedLegs
 from nmm.robots.robot import Robot

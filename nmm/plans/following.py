@@ -10,13 +10,13 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.errors import NmmError, RunError, expect
+from nmm.base.findings import Finding
+from nmm.base.kernels.compiled import checked_by_caller, compiled, kernel, scratch, view
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.control.goal import Goal, error_sizes, norms, unit_codes
-from nmm.errors import NmmError, RunError, expect
-from nmm.findings import Finding
 from nmm.functions.function import Function, Renewal, Row, Shown, Stage
-from nmm.kernels.compiled import checked_by_caller, compiled, kernel, scratch, view
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.reach import first_tip
 from nmm.robots.robot import Robot
 

@@ -11,17 +11,17 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.errors import InputError, RunError, few
+from nmm.base.kernels.compiled import checked_by_caller, compiled, scratch
+from nmm.base.kernels.linear_algebra import dot, eliminate
+from nmm.base.kernels.record_layout import BLOCKS, IntegerCell, IntegerVector, Matrix, Vector, views
+from nmm.base.kernels.velocity_map import place_mimic_joints
 from nmm.collisions.motion_check import MotionCheck
 from nmm.control.goal import ANOTHER, Goal, norms, unit_codes
-from nmm.errors import InputError, RunError, few
 from nmm.functions.program import BESIDE, COMPILED, LaidOut, Program, run_program
 from nmm.functions.tasks.linear_coordinates import Posture
 from nmm.functions.tasks.task import Comparison, Task
-from nmm.kernels.compiled import checked_by_caller, compiled, scratch
-from nmm.kernels.linear_algebra import dot, eliminate
-from nmm.kernels.record_layout import BLOCKS, IntegerCell, IntegerVector, Matrix, Vector, views
-from nmm.kernels.velocity_map import place_mimic_joints
 from nmm.robots.robot import Robot
 
 #: A configuration, coordinates by name, a task with a target that stands, or several of these.

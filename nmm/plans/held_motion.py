@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
 from nmm.collisions.legs_check import MARGIN
 from nmm.control.limits import LimitsOn
 from nmm.plans.holding import ARRIVED, Followed, Held

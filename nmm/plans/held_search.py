@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError, RunError
 from nmm.collisions.legs_check import MARGIN
-from nmm.errors import InputError, RunError
 from nmm.plans.goals import ATTEMPTS, GoalPostures, Wanted, alternatives, nothing_found
 from nmm.plans.held_motion import ROUND, HeldTiming
 from nmm.plans.holding import ARRIVED, BLOCKED, LOST, Held

@@ -13,17 +13,17 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.errors import InputError, expect_kind
+from nmm.base.kernels.compiled import checked_by_caller, compiled, compiled_without_gil, scratch
+from nmm.base.kernels.linear_algebra import copied
+from nmm.base.kernels.record_layout import BLOCKS, views
 from nmm.collisions.legs_check import MovedShapes, along, leg_blocked, too_near
 from nmm.collisions.motion_check import MotionCheck
 from nmm.control.goal import Goal, norms, unit_codes
-from nmm.errors import InputError, expect_kind
 from nmm.functions.program import BESIDE, evaluate
 from nmm.functions.tasks.pose import Pose
 from nmm.functions.tasks.task import Task
-from nmm.kernels.compiled import checked_by_caller, compiled, compiled_without_gil, scratch
-from nmm.kernels.linear_algebra import copied
-from nmm.kernels.record_layout import BLOCKS, views
 from nmm.plans.goals import STEPS, Newton, TaskError, newton_step
 from nmm.plans.tree import PLACE, Trees
 from nmm.plans.ways import leg_time

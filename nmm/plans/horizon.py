@@ -7,17 +7,17 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, counted, positive, scalar
+from nmm.base.arrays import Array, counted, positive, scalar
+from nmm.base.errors import InputError, expect_kind
+from nmm.base.findings import Finding
+from nmm.base.kernels.compiled import checked_by_caller
+from nmm.base.kernels.record_layout import Memory, views
 from nmm.collisions.motion_check import MotionCheck
 from nmm.collisions.obstacle import shifts
 from nmm.control.collisions import Collisions
 from nmm.control.goal import Goal, error_sizes
 from nmm.control.limits import Limits
-from nmm.errors import InputError, expect_kind
-from nmm.findings import Finding
 from nmm.functions.tasks.task import Task
-from nmm.kernels.compiled import checked_by_caller
-from nmm.kernels.record_layout import Memory, views
 from nmm.plans.following import differences
 from nmm.plans.goals import TaskError, goal_task
 from nmm.plans.interior import SHOOT, shoot

@@ -11,10 +11,10 @@ import math
 
 from numba import types
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import clear, compiled, compiled_without_gil, scratch
+from nmm.base.kernels.record_layout import BLOCKS, views
 from nmm.collisions.legs_check import MovedShapes
-from nmm.kernels.compiled import clear, compiled, compiled_without_gil, scratch
-from nmm.kernels.record_layout import BLOCKS, views
 from nmm.plans.shooting import Shooting, write_all
 
 #: The longest step of a round, m and rad.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from nmm.arrays import Array
-from nmm.errors import InputError, expect_kind
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError, expect_kind
 from nmm.functions.objectives.base import Objective
 from nmm.functions.program import COMPILED, Program, run_program
 from nmm.plans.shooting import Shooting

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from nmm.arrays import Array, scalar
-from nmm.errors import InputError
+from nmm.base.arrays import Array, scalar
+from nmm.base.errors import InputError
+from nmm.base.kernels.compiled import compiled, kernel, scratch
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.functions.function import Function, Row, Stage
-from nmm.kernels.compiled import compiled, kernel, scratch
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.plans.ways import ROLLS, Ways, ways_of
 from nmm.plans.words import PARTS, reeds_shepp, wrapped
 from nmm.robots.robot import Robot

@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 from numba import types
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.kernels.compiled import checked_by_caller, compiled
+from nmm.base.kernels.record_layout import BLOCKS, Blocks, views
 from nmm.collisions.legs_check import along
-from nmm.kernels.compiled import checked_by_caller, compiled
-from nmm.kernels.record_layout import BLOCKS, Blocks, views
 from nmm.plans.tree import PLACE, Trees
 from nmm.plans.ways import LEGS, find_way, leg_time
 

@@ -9,12 +9,12 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, positive
+from nmm.base.arrays import Array, positive
+from nmm.base.errors import InputError
 from nmm.collisions.scene import Scene
 from nmm.control.collisions import Collisions
 from nmm.control.goal import Goal
 from nmm.control.limits import Limits, LimitsOn
-from nmm.errors import InputError
 from nmm.functions.objectives.base import Objective
 from nmm.functions.tasks.task import Task
 from nmm.plans.following import FromPlan

@@ -11,13 +11,13 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, counted, positive, scalar
+from nmm.base.arrays import Array, counted, positive, scalar
+from nmm.base.errors import InputError, NmmError, RunError, expect_kind, few
 from nmm.collisions.obstacle import Obstacle
 from nmm.collisions.scene import Scene
 from nmm.control.collisions import Collisions
 from nmm.control.goal import Goal
 from nmm.control.limits import Limits
-from nmm.errors import InputError, NmmError, RunError, expect_kind, few
 from nmm.functions.objectives.base import Objective
 from nmm.functions.tasks.task import Task
 from nmm.plans.goals import Wanted, alternatives

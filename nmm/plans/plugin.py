@@ -1,6 +1,6 @@
 """The plugin that plans motions: the task `parking`, the command `nmm plan` and the scenario's key `plan`."""
 
-from nmm.plugins import Plugin
+from nmm.base.plugins import Plugin
 
 PLUGIN = Plugin(
     "planning",

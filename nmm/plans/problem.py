@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.collisions.motion_check import MotionCheck
 from nmm.control.limits import LimitsOn
 from nmm.plans.shooting import Shooting

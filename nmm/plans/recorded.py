@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.collisions.scene import Scene
 from nmm.control.limits import LimitsOn
 from nmm.functions.tasks.task import Task

@@ -10,9 +10,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, counted, positive, scalar
+from nmm.base.arrays import Array, counted, positive, scalar
+from nmm.base.errors import InputError, expect_kind
 from nmm.collisions.obstacle import Obstacle
-from nmm.errors import InputError, expect_kind
 from nmm.plans.following import differences
 from nmm.plans.plan import Plan
 from nmm.plans.planned import finished

@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from nmm.arrays import Array, Integers
-from nmm.kernels.compiled import call_platform, checked_by_caller, clear, compiled, scratch, view
-from nmm.kernels.linear_algebra import copied
-from nmm.kernels.record_layout import BLOCKS, IntegerCell, Matrix, Memory, Vector, views
-from nmm.kernels.velocity_map import place_mimic_joints, to_coordinates
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import call_platform, checked_by_caller, clear, compiled, scratch, view
+from nmm.base.kernels.linear_algebra import copied
+from nmm.base.kernels.record_layout import BLOCKS, IntegerCell, Matrix, Memory, Vector, views
+from nmm.base.kernels.velocity_map import place_mimic_joints, to_coordinates
 from nmm.robots.zero_order_hold import Inputs
 
 #: The method's times, slopes' shares of each stage, and of the step.

@@ -12,12 +12,12 @@ from typing import TypeVar
 
 import numpy as np
 
-from nmm.arrays import Array, counted
+from nmm.base.arrays import Array, counted
+from nmm.base.errors import InputError, RunError, few
+from nmm.base.kernels.compiled import checked_by_caller
+from nmm.base.kernels.record_layout import views
 from nmm.collisions.legs_check import MARGIN
 from nmm.collisions.motion_check import MotionCheck
-from nmm.errors import InputError, RunError, few
-from nmm.kernels.compiled import checked_by_caller
-from nmm.kernels.record_layout import views
 from nmm.plans import tree
 from nmm.plans.effort import efforts_of
 from nmm.plans.goals import GoalPostures, Wanted, alternatives, nothing_found

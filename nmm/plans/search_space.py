@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.collisions.obstacle import Obstacle
 from nmm.collisions.shapes import HalfSpace
 from nmm.control.limits import LimitsOn

@@ -9,18 +9,10 @@ from typing import NamedTuple
 
 from numba import types
 
-from nmm.arrays import Array, Integers
-from nmm.collisions.legs_check import (
-    MovedShapes,
-    begin_motion,
-    look,
-    place_shape,
-    placed_bound,
-    write_approach,
-)
-from nmm.kernels.compiled import call_platform, clear, compiled, compiled_without_gil, scratch, view
-from nmm.kernels.kinematics import axes, place_joints
-from nmm.kernels.record_layout import (
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import call_platform, clear, compiled, compiled_without_gil, scratch, view
+from nmm.base.kernels.kinematics import axes, place_joints
+from nmm.base.kernels.record_layout import (
     BLOCKS,
     Cell,
     IntegerCell,
@@ -29,6 +21,14 @@ from nmm.kernels.record_layout import (
     Matrix,
     Vector,
     views,
+)
+from nmm.collisions.legs_check import (
+    MovedShapes,
+    begin_motion,
+    look,
+    place_shape,
+    placed_bound,
+    write_approach,
 )
 from nmm.plans.samples import flow, write_fastest
 from nmm.robots.wheel_rates import rolling

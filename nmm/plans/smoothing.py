@@ -8,11 +8,11 @@ from typing import Protocol
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.kernels.compiled import checked_by_caller
+from nmm.base.kernels.record_layout import Memory, views
 from nmm.collisions.motion_check import MotionCheck
 from nmm.control.limits import LimitsOn
-from nmm.kernels.compiled import checked_by_caller
-from nmm.kernels.record_layout import Memory, views
 from nmm.plans.interior import SHOOT, shoot
 from nmm.plans.objective import SampleCosts
 from nmm.plans.problem import MU, largest_inputs, shooting_problem, steps_within

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
 from nmm.control.limits import LimitsOn
 from nmm.plans.path import Guide
 from nmm.robots.robot import Robot

@@ -9,12 +9,12 @@ from typing import cast
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import RunError
+from nmm.base.kernels.compiled import checked_by_caller
+from nmm.base.kernels.record_layout import Memory, views
 from nmm.collisions.motion_check import MotionCheck
 from nmm.control.limits import LimitsOn
-from nmm.errors import RunError
-from nmm.kernels.compiled import checked_by_caller
-from nmm.kernels.record_layout import Memory, views
 from nmm.plans.objective import SampleCosts
 from nmm.plans.samples import SampledMotion
 from nmm.plans.smoothing import Smoothing

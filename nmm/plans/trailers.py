@@ -12,11 +12,10 @@ from typing import NamedTuple
 
 from numba import types
 
-from nmm.arrays import Array, Integers
-from nmm.collisions.legs_check import MovedShapes, too_near
-from nmm.kernels.compiled import clear, compiled, compiled_without_gil, scratch
-from nmm.kernels.linear_algebra import copied
-from nmm.kernels.record_layout import (
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import clear, compiled, compiled_without_gil, scratch
+from nmm.base.kernels.linear_algebra import copied
+from nmm.base.kernels.record_layout import (
     BLOCKS,
     Cell,
     IntegerCell,
@@ -28,6 +27,7 @@ from nmm.kernels.record_layout import (
     Vector,
     views,
 )
+from nmm.collisions.legs_check import MovedShapes, too_near
 from nmm.plans.samples import flow
 from nmm.plans.tree import draw
 from nmm.plans.words import PARTS, STRAIGHT, dubins, wrapped

@@ -15,11 +15,10 @@ from typing import NamedTuple
 
 from numba import types
 
-from nmm.arrays import Array, Integers
-from nmm.collisions.legs_check import MovedShapes, along, first_blocked, too_near
-from nmm.kernels.compiled import compiled, compiled_without_gil, scratch
-from nmm.kernels.linear_algebra import copied
-from nmm.kernels.record_layout import (
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import compiled, compiled_without_gil, scratch
+from nmm.base.kernels.linear_algebra import copied
+from nmm.base.kernels.record_layout import (
     BLOCKS,
     Cell,
     IntegerMatrix,
@@ -29,7 +28,8 @@ from nmm.kernels.record_layout import (
     header_length,
     views,
 )
-from nmm.kernels.velocity_map import place_mimic_joints
+from nmm.base.kernels.velocity_map import place_mimic_joints
+from nmm.collisions.legs_check import MovedShapes, along, first_blocked, too_near
 from nmm.plans.ways import Ways, find_way, least_time, leg_time, way_time
 
 #: Of random configurations, the share whose arm is between those of a start and a goal.

@@ -15,12 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.kernels.record_layout import views
 from nmm.collisions.legs_check import MovedShapes
 from nmm.collisions.motion_check import MotionCheck
 from nmm.collisions.obstacle import shifts
 from nmm.collisions.scene import Scene
-from nmm.kernels.record_layout import views
 from nmm.plans.timing import TimedLegs
 from nmm.robots.joint_table import as_row
 from nmm.robots.robot import Robot

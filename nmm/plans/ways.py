@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nmm.arrays import Array
-from nmm.errors import InputError
-from nmm.kernels.compiled import clear, compiled, scratch
-from nmm.kernels.record_layout import Cell, IntegerCell, IntegerVector, Vector
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError
+from nmm.base.kernels.compiled import clear, compiled, scratch
+from nmm.base.kernels.record_layout import Cell, IntegerCell, IntegerVector, Vector
 from nmm.plans.words import PARTS, dubins, reeds_shepp, wrapped
 from nmm.platforms.steering import SteeredAxle, SteeringPivot
 from nmm.platforms.tractor import Tractor

@@ -8,8 +8,8 @@ the origin with heading 0.
 
 import math
 
-from nmm.arrays import Array
-from nmm.kernels.compiled import compiled, scratch
+from nmm.base.arrays import Array
+from nmm.base.kernels.compiled import compiled, scratch
 
 #: A word has at most this many parts.
 PARTS = 5

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from nmm.kinds import PLATFORMS as PLATFORMS
+from nmm.base.kinds import PLATFORMS as PLATFORMS
 from nmm.platforms.base import Platform as Platform
 from nmm.platforms.car import Car as Car
 from nmm.platforms.car import FrontDriveCar as FrontDriveCar

@@ -10,10 +10,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, positive, vector
-from nmm.errors import InputError, expect, expect_known
-from nmm.findings import Finding
-from nmm.kernels.compiled import Kernel
+from nmm.base.arrays import Array, positive, vector
+from nmm.base.errors import InputError, expect, expect_known
+from nmm.base.findings import Finding
+from nmm.base.kernels.compiled import Kernel
 from nmm.platforms.steering import SteeredAxle
 from nmm.platforms.wheel_layout import AddedJoint, Layout
 

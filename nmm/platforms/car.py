@@ -9,10 +9,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, positive
-from nmm.errors import expect
-from nmm.findings import Finding
-from nmm.kernels.compiled import PLATFORM, kernel
+from nmm.base.arrays import Array, positive
+from nmm.base.errors import expect
+from nmm.base.findings import Finding
+from nmm.base.kernels.compiled import PLATFORM, kernel
 from nmm.platforms.base import Platform, coordinates_with, of_many
 from nmm.platforms.steering import SteeredAxle, SteeringPivot, steered_pair
 from nmm.platforms.unicycle import across, roll_ahead

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nmm.errors import InputError
-from nmm.findings import Finding
-from nmm.kinds import PLATFORMS
+from nmm.base.errors import InputError
+from nmm.base.findings import Finding
+from nmm.base.kinds import PLATFORMS
 from nmm.platforms.wheel_layout import (
     MAIN_BODY,
     NEAR,

@@ -10,9 +10,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, positive, scalar
-from nmm.errors import expect
-from nmm.kernels.compiled import PLATFORM, kernel
+from nmm.base.arrays import Array, positive, scalar
+from nmm.base.errors import expect
+from nmm.base.kernels.compiled import PLATFORM, kernel
 from nmm.platforms.base import Platform, of_many
 from nmm.platforms.unicycle import across
 from nmm.platforms.wheel_layout import NEAR, Layout, RollingJoint, common_radius, main_wheels, same

@@ -10,9 +10,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, positive, scalar
-from nmm.errors import expect, one_or_several
-from nmm.kernels.compiled import PLATFORM, kernel, scratch
+from nmm.base.arrays import Array, positive, scalar
+from nmm.base.errors import expect, one_or_several
+from nmm.base.kernels.compiled import PLATFORM, kernel, scratch
+from nmm.base.text_format import apart
 from nmm.platforms.base import Platform, coordinates_with, of_many
 from nmm.platforms.steering import SteeredAxle, SteeringPivot
 from nmm.platforms.unicycle import roll_ahead
@@ -27,7 +28,6 @@ from nmm.platforms.wheel_layout import (
     symmetric_limit,
     wheels_on,
 )
-from nmm.text_format import apart
 
 #: Beyond its limit a hitch is folded by more than this, rad.
 _SLACK = 1e-9

@@ -9,9 +9,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, positive
-from nmm.findings import Finding
-from nmm.kernels.compiled import PLATFORM, compiled, kernel
+from nmm.base.arrays import Array, positive
+from nmm.base.findings import Finding
+from nmm.base.kernels.compiled import PLATFORM, compiled, kernel
 from nmm.platforms.base import Platform, of_many
 from nmm.platforms.wheel_layout import (
     NEAR,

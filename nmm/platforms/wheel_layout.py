@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from nmm.errors import InputError
-from nmm.findings import Finding
+from nmm.base.errors import InputError
+from nmm.base.findings import Finding
 
 #: Lengths of a robot's file that differ by less, m, are meant to be the same: files round, and drawings lie.
 NEAR = 5e-3

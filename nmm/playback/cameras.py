@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.playback.drawing import Command, Drawing, Rgb, animation, packed, page_times
 from nmm.playback.keyframes import samples_kept
 from nmm.playback.shapes import DrawnRobot, sphere

@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.findings.run import line
+from nmm.base.resolver_style import DASHES, Look, pretty, rate
 from nmm.control.quantities import Curve, RecordedQuantity, placed
 from nmm.diagnosis.jumps import chattering
 from nmm.diagnosis.limits import AT_LIMIT
 from nmm.diagnosis.motors import motor_findings, motor_torques
 from nmm.diagnosis.summary import settling_time, summarise
-from nmm.findings.run import line
 from nmm.playback.drawing import Drawing, packed
 from nmm.playback.keyframes import MOST_FRAMES, samples_kept
-from nmm.resolver_style import DASHES, Look, pretty, rate
 from nmm.robots.motion import Motion
 from nmm.robots.robot import Robot
 from nmm.runs.components import Axes, components

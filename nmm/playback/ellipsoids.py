@@ -15,8 +15,8 @@ from nmm.analysis.singular.ellipsoids import (
     scale_text,
 )
 from nmm.analysis.singular.parts import WHOLE
-from nmm.arrays import Array, interpolated
-from nmm.ellipsoid_options import EllipsoidOptions
+from nmm.base.arrays import Array, interpolated
+from nmm.base.ellipsoid_options import EllipsoidOptions
 from nmm.playback.drawing import Command, Drawing, Rgb, animation, page_times
 from nmm.playback.extent import extent_of
 from nmm.playback.keyframes import Keyframes

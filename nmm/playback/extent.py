@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array, interpolated
+from nmm.base.arrays import Array, interpolated
 from nmm.playback.keyframes import Keyframes
 from nmm.playback.placements import Placements, base_position
 from nmm.playback.rolling import Rolling

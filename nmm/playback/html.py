@@ -10,9 +10,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from nmm.ellipsoid_options import Wanted
-from nmm.errors import RunError
-from nmm.files import replaceable, whole_file, written_at
+from nmm.base.ellipsoid_options import Wanted
+from nmm.base.errors import RunError
+from nmm.base.files import replaceable, whole_file, written_at
 from nmm.playback.drawing import Command, encode
 from nmm.playback.scene import Shown, playback_scene
 

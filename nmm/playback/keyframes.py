@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nmm.arrays import Array, interpolated
+from nmm.base.arrays import Array, interpolated
 from nmm.playback.placements import base_position
 from nmm.playback.rolling import wheel_angles
 from nmm.robots.motion import Motion

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import vector
-from nmm.ellipsoid_options import Wanted
+from nmm.base.arrays import vector
+from nmm.base.ellipsoid_options import Wanted
 from nmm.playback.rolling import RolledRobot
 from nmm.playback.scene import Shown, playback_scene
 from nmm.playback.server import Visitor

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from nmm.arrays import Array, Flags, Integers
+from nmm.base.arrays import Array, Flags, Integers
 from nmm.robots.mesh_files import meshes_of
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.playback.drawing import Command, Drawing, Rgb, animation, encode, packed, page_times
 from nmm.playback.extent import shape_corners
 from nmm.playback.keyframes import samples_kept

@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
-from nmm.errors import RobotError
+from nmm.base.arrays import Array
+from nmm.base.errors import RobotError
 from nmm.robots.robot import Robot
 
 #: Configurations at which an input may move a body: a steered body stands still at some.

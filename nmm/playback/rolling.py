@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, vector
+from nmm.base.arrays import Array, vector
 from nmm.playback.placements import Carriers, at_point, rolling_joints
 from nmm.robots.loading.joint_kinds import axis
 from nmm.robots.motion import Motion

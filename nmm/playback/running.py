@@ -11,12 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.ellipsoid_options import Wanted
+from nmm.base.errors import NmmError
+from nmm.base.resolver_style import looks_of_labels
 from nmm.control.controller import Controller
 from nmm.control.quantities import Record
 from nmm.control.recorded import Recorded
-from nmm.ellipsoid_options import Wanted
-from nmm.errors import NmmError
 from nmm.playback.cameras import live_numbers
 from nmm.playback.channels import live_channels, partition_text
 from nmm.playback.drawing import Drawing, encode, packed
@@ -24,7 +25,6 @@ from nmm.playback.rolling import RolledRobot
 from nmm.playback.scene import playback_scene
 from nmm.playback.server import Visitor
 from nmm.playback.session import RobotSession, Watching, counted
-from nmm.resolver_style import looks_of_labels
 from nmm.robots.frame_path import FramePath
 from nmm.robots.motion import Camera
 from nmm.robots.surroundings import NO_SURROUNDINGS, Surroundings

@@ -17,7 +17,7 @@ import tornado.websocket
 from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 
-from nmm.errors import InputError, RunError, expect
+from nmm.base.errors import InputError, RunError, expect
 
 LOOPBACK = "127.0.0.1"
 #: Tried in this order when no port is asked for; if all are taken, the system chooses.

@@ -15,8 +15,9 @@ from typing import Any, Self
 
 import numpy as np
 
+from nmm.base.errors import InputError, expect
+from nmm.base.resolver_style import Look
 from nmm.collisions.obstacle import Obstacle
-from nmm.errors import InputError, expect
 from nmm.playback.cameras import draw_camera, tell_cameras
 from nmm.playback.channels import Channel, Channels, draw_curves
 from nmm.playback.drawing import Command, Drawing, encode
@@ -26,7 +27,6 @@ from nmm.playback.rolling import RolledRobot
 from nmm.playback.scene import draw_beside, live_scene, still
 from nmm.playback.server import PageServer, Visitor
 from nmm.playback.sticks import appearance
-from nmm.resolver_style import Look
 from nmm.robots.motion import Camera
 from nmm.robots.robot import Robot
 from nmm.robots.surroundings import NO_SURROUNDINGS, Surroundings

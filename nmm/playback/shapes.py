@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.playback.drawing import Command, Drawing, Rgb, animation, packed, page_times, segment
 from nmm.playback.keyframes import Keyframes
 from nmm.playback.meshes import OFF, Color, Indices, mesh_pieces

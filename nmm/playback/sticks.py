@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
-from nmm.errors import RobotError
+from nmm.base.arrays import Array
+from nmm.base.errors import RobotError
 from nmm.playback.placements import joint_screw
 from nmm.robots.loading.joint_kinds import axis, is_revolute, kind
 from nmm.robots.loading.provenance import loaded_parts

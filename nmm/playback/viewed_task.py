@@ -10,10 +10,11 @@ from nmm.analysis.singular.ellipsoids import ARM, drawn_scale, ellipsoids_along
 from nmm.analysis.singular.jacobians import Jacobians
 from nmm.analysis.singular.parts import WHOLE, columns_of, part
 from nmm.analysis.singular.singularity import TOLERANCE
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.ellipsoid_options import EllipsoidOptions
+from nmm.base.errors import InputError, SingularError, expect
+from nmm.base.resolver_style import looks
 from nmm.control.directions import WORLD_PARTS, direction_words, in_world_axes, readable_basis
-from nmm.ellipsoid_options import EllipsoidOptions
-from nmm.errors import InputError, SingularError, expect
 from nmm.functions.function import Function
 from nmm.functions.tasks.task import Task
 from nmm.playback.drawing import Command, Drawing, encode
@@ -21,7 +22,6 @@ from nmm.playback.ellipsoids import ARM_COLOR, OPACITY, THINNEST, draw_legend
 from nmm.playback.extent import extent_of
 from nmm.playback.server import Visitor
 from nmm.playback.session import message
-from nmm.resolver_style import looks
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.functions.function import Function
 from nmm.functions.program import Program
 from nmm.functions.tasks.task import Stack, Task

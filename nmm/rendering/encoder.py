@@ -7,8 +7,8 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from nmm.errors import InputError, RunError, expect
-from nmm.files import replaceable, writing, written_at
+from nmm.base.errors import InputError, RunError, expect
+from nmm.base.files import replaceable, writing, written_at
 
 CODECS = {
     ".mp4": ("-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart"),

@@ -8,12 +8,12 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from nmm.arrays import counted, positive
-from nmm.ellipsoid_options import Wanted
-from nmm.errors import InputError, expect, expect_known
+from nmm.base.arrays import counted, positive
+from nmm.base.ellipsoid_options import Wanted
+from nmm.base.errors import InputError, expect, expect_known
+from nmm.base.progress import Progress
 from nmm.playback.html import write_html
 from nmm.playback.scene import Shown
-from nmm.progress import Progress
 from nmm.rendering.chromium import HeadlessPage, find_browser
 from nmm.rendering.encoder import encode, expect_video, find_ffmpeg
 

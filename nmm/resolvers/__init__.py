@@ -1,4 +1,4 @@
-"""Resolvers, one file each; `nmm.kinds` lists them by name."""
+"""Resolvers, one file each; `nmm.base.kinds` lists them by name."""
 
 from nmm.resolvers.answer import Answer as Answer
 from nmm.resolvers.answer import Status as Status

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nmm.arrays import Array
-from nmm.kernels.compiled import compiled, inlined
-from nmm.kernels.linear_algebra import norm, residual_norm
-from nmm.kernels.record_layout import SampledCell, SampledVector
+from nmm.base.arrays import Array
+from nmm.base.kernels.compiled import compiled, inlined
+from nmm.base.kernels.linear_algebra import norm, residual_norm
+from nmm.base.kernels.record_layout import SampledCell, SampledVector
 from nmm.resolvers.problem_arrays import ProblemArrays
 
 

@@ -9,11 +9,11 @@ from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeAlias, get_args
 import numpy as np
 from numba import types
 
-from nmm.arrays import Array, Integers, array
-from nmm.errors import InputError, expect, expect_known
-from nmm.findings import Finding
-from nmm.kernels.compiled import Kernel, caller, compiled
-from nmm.kernels.record_layout import LaidOutRecord, Memory, header_length, views
+from nmm.base.arrays import Array, Integers, array
+from nmm.base.errors import InputError, expect, expect_known
+from nmm.base.findings import Finding
+from nmm.base.kernels.compiled import Kernel, caller, compiled
+from nmm.base.kernels.record_layout import LaidOutRecord, Memory, header_length, views
 from nmm.resolvers.answer import Answer, AnswerArrays, unanswered
 from nmm.resolvers.limit_check import keep_limits
 from nmm.resolvers.problem import Dimensions, Problem

@@ -9,10 +9,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, Integers
-from nmm.errors import InputError
-from nmm.kernels.compiled import Kernel, clear, kernel
-from nmm.kernels.linear_algebra import residual_norm
+from nmm.base.arrays import Array, Integers
+from nmm.base.errors import InputError
+from nmm.base.kernels.compiled import Kernel, clear, kernel
+from nmm.base.kernels.linear_algebra import residual_norm
 from nmm.resolvers.answer import SOLVED, Answer, AnswerArrays, Status, certified
 from nmm.resolvers.base import RESOLVER, Resolver, Setup
 from nmm.resolvers.limit_check import bring_within

@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import math
 
-from nmm.arrays import Array, Integers
-from nmm.kernels.active_set import DEPENDENT, Basis, combination, join, nearest, split
-from nmm.kernels.compiled import clear, compiled, integer_scratch, scratch
-from nmm.kernels.damping import CONSTANT, Law, damped_solution
-from nmm.kernels.linear_algebra import add, copied, dot, norm, project_out, times, times_matrix
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.active_set import DEPENDENT, Basis, combination, join, nearest, split
+from nmm.base.kernels.compiled import clear, compiled, integer_scratch, scratch
+from nmm.base.kernels.damping import CONSTANT, Law, damped_solution
+from nmm.base.kernels.linear_algebra import add, copied, dot, norm, project_out, times, times_matrix
 from nmm.resolvers.answer import INEXACT, RELAXED, AnswerArrays, certify
 from nmm.resolvers.limit_check import rows_of_limits
 from nmm.resolvers.problem_arrays import LOWER, UPPER, ProblemArrays

@@ -6,10 +6,10 @@ from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
-from nmm.arrays import Array, Integers, positive
-from nmm.errors import expect_known
-from nmm.kernels.compiled import Kernel, compiled, kernel, view
-from nmm.kernels.damping import BELOW, LARGEST, Law
+from nmm.base.arrays import Array, Integers, positive
+from nmm.base.errors import expect_known
+from nmm.base.kernels.compiled import Kernel, compiled, kernel, view
+from nmm.base.kernels.damping import BELOW, LARGEST, Law
 from nmm.resolvers.answer import AnswerArrays
 from nmm.resolvers.base import RESOLVER, Resolver, Setup, StepRule, Weights, metric_root, step_rule
 from nmm.resolvers.damped import any_passed, damp, damp_between_stops

@@ -6,11 +6,11 @@ from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
-from nmm.arrays import Array, Integers, positive
-from nmm.errors import expect, expect_known
-from nmm.kernels.compiled import Kernel, clear, compiled, integer_scratch, kernel, scratch, view
-from nmm.kernels.damping import USUAL, damped_solution
-from nmm.kernels.linear_algebra import (
+from nmm.base.arrays import Array, Integers, positive
+from nmm.base.errors import expect, expect_known
+from nmm.base.kernels.compiled import Kernel, clear, compiled, integer_scratch, kernel, scratch, view
+from nmm.base.kernels.damping import USUAL, damped_solution
+from nmm.base.kernels.linear_algebra import (
     add,
     closest_solution,
     copied,

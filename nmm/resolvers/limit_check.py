@@ -6,11 +6,11 @@ import math
 
 from numba import types
 
-from nmm.arrays import Array
-from nmm.kernels.active_set import FEASIBLE
-from nmm.kernels.compiled import caller, clear, compiled, scratch, view
-from nmm.kernels.linear_algebra import copied, dot, times_matrix
-from nmm.kernels.record_layout import record_type
+from nmm.base.arrays import Array
+from nmm.base.kernels.active_set import FEASIBLE
+from nmm.base.kernels.compiled import caller, clear, compiled, scratch, view
+from nmm.base.kernels.linear_algebra import copied, dot, times_matrix
+from nmm.base.kernels.record_layout import record_type
 from nmm.resolvers.answer import NOT_FINITE, SINGULAR_J, AnswerArrays
 from nmm.resolvers.problem_arrays import ProblemArrays
 

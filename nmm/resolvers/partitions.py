@@ -9,11 +9,11 @@ from typing import Self
 
 import numpy as np
 
-from nmm.arrays import Array, Integers
-from nmm.errors import InputError, expect, expect_kind, expect_known
-from nmm.findings import Finding
-from nmm.kernels.compiled import clear, compiled, integer_scratch, scratch, view
-from nmm.kernels.linear_algebra import add, copied, dot, eliminate, orthonormal_rows
+from nmm.base.arrays import Array, Integers
+from nmm.base.errors import InputError, expect, expect_kind, expect_known
+from nmm.base.findings import Finding
+from nmm.base.kernels.compiled import clear, compiled, integer_scratch, scratch, view
+from nmm.base.kernels.linear_algebra import add, copied, dot, eliminate, orthonormal_rows
 from nmm.resolvers.base import State
 from nmm.resolvers.problem import Dimensions
 

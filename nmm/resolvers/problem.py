@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, Integers, array, scalar, vector
-from nmm.errors import InputError, expect
+from nmm.base.arrays import Array, Integers, array, scalar, vector
+from nmm.base.errors import InputError, expect
+from nmm.base.text_format import apart
 from nmm.resolvers.problem_arrays import ProblemArrays
 from nmm.resolvers.saturation import limit
-from nmm.text_format import apart
 
 #: Fields of `ProblemArrays` besides the problem's own numbers.
 MEMORY = ("ends", "stops", "active", "limiter")

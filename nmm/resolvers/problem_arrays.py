@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from nmm.kernels.record_layout import (
+from nmm.base.kernels.record_layout import (
     Cell,
     IntegerVector,
     Matrix,

@@ -6,10 +6,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from nmm.arrays import Array, Integers, positive
-from nmm.kernels.compiled import Kernel, integer_scratch, kernel, scratch, view
-from nmm.kernels.damping import USUAL
-from nmm.kernels.linear_algebra import closest_solution, orthonormal_rows
+from nmm.base.arrays import Array, Integers, positive
+from nmm.base.kernels.compiled import Kernel, integer_scratch, kernel, scratch, view
+from nmm.base.kernels.damping import USUAL
+from nmm.base.kernels.linear_algebra import closest_solution, orthonormal_rows
 from nmm.resolvers.answer import SINGULAR_J, AnswerArrays, certify
 from nmm.resolvers.base import RESOLVER, Resolver, Setup, StepRule, Weights, metric_root, step_rule
 from nmm.resolvers.damped import damp, unweigh, weigh

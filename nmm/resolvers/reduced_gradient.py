@@ -8,11 +8,11 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from nmm.arrays import Array, Integers, positive
-from nmm.errors import InputError, expect, expect_known
-from nmm.kernels.compiled import Kernel, clear, compiled, kernel, scratch, view
-from nmm.kernels.damping import BELOW, USUAL, step_threshold
-from nmm.kernels.linear_algebra import copied
+from nmm.base.arrays import Array, Integers, positive
+from nmm.base.errors import InputError, expect, expect_known
+from nmm.base.kernels.compiled import Kernel, clear, compiled, kernel, scratch, view
+from nmm.base.kernels.damping import BELOW, USUAL, step_threshold
+from nmm.base.kernels.linear_algebra import copied
 from nmm.resolvers.answer import INEXACT, RELAXED, SINGULAR_J, SINGULAR_JA, AnswerArrays, certify
 from nmm.resolvers.base import RESOLVER, Resolver, Setup, StepRule, Weights, step_rule, weight_diagonal
 from nmm.resolvers.damped import damp

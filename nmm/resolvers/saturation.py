@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import math
 
-from nmm.arrays import Array
-from nmm.kernels.active_set import Rows, nearest_within
-from nmm.kernels.compiled import clear, compiled, integer_scratch, kernel, scratch, view
-from nmm.kernels.linear_algebra import copied, dot, norm, residual_norm, solve, times, times_matrix
+from nmm.base.arrays import Array
+from nmm.base.kernels.active_set import Rows, nearest_within
+from nmm.base.kernels.compiled import clear, compiled, integer_scratch, kernel, scratch, view
+from nmm.base.kernels.linear_algebra import copied, dot, norm, residual_norm, solve, times, times_matrix
 from nmm.resolvers.answer import EXACT, FALLBACK, INEXACT, RELAXED, SINGULAR_J, SOLVED, AnswerArrays, certify
 from nmm.resolvers.limit_check import LIMIT, rows_of_limits, within
 from nmm.resolvers.problem_arrays import ProblemArrays

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, unwritable
+from nmm.base.arrays import Array, unwritable
 from nmm.robots.joint_table import placement_rows
 from nmm.robots.robot import CENTER_OF_MASS, Robot
 

@@ -8,12 +8,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, Flags, Integers, scalar, unwritable, vector
-from nmm.errors import InputError, expect_known, few
+from nmm.base.arrays import Array, Flags, Integers, scalar, unwritable, vector
+from nmm.base.errors import InputError, expect_known, few
+from nmm.base.text_format import apart
 from nmm.platforms.base import Platform
 from nmm.robots.mimic_joints import SLACK, MimicJoint, MimicJoints
 from nmm.robots.semantics import POSTURE, Named, NamedPostures, Semantics
-from nmm.text_format import apart
 
 #: A limit this large is none, m or rad.
 UNLIMITED = 1e5

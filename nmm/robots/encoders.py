@@ -10,8 +10,8 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, scalar, vector
-from nmm.errors import InputError, expect_known, few, no_such
+from nmm.base.arrays import Array, scalar, vector
+from nmm.base.errors import InputError, expect_known, few, no_such
 from nmm.robots.robot import Robot
 from nmm.robots.wheel_rates import steered_wheels
 

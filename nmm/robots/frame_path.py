@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from nmm.arrays import Array, Integers
-from nmm.kernels.compiled import clear, kernel, scratch, view
-from nmm.kernels.kinematics import Kinematics, compose, place_frames, place_joints
-from nmm.kernels.record_layout import Memory, views
-from nmm.progress import Progress
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import clear, kernel, scratch, view
+from nmm.base.kernels.kinematics import Kinematics, compose, place_frames, place_joints
+from nmm.base.kernels.record_layout import Memory, views
+from nmm.base.progress import Progress
 from nmm.robots.joint_table import frame_table
 from nmm.robots.robot import CENTER_OF_MASS, Robot
 

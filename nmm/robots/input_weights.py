@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, scalar
-from nmm.errors import expect_known
+from nmm.base.arrays import Array, scalar
+from nmm.base.errors import expect_known
 
 #: Numbers above 0: by input or by group ("platform", "arm"), an input's own deciding; 1 for the rest.
 Weights = ArrayLike | Mapping[str, float]

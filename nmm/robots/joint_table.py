@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
-from nmm.errors import NmmError
-from nmm.kernels.kinematics import FrameTable, Joints
+from nmm.base.arrays import Array
+from nmm.base.errors import NmmError
+from nmm.base.kernels.kinematics import FrameTable, Joints
 
 
 def joint_table(model: pin.Model, turned: Sequence[pin.SE3]) -> Joints:

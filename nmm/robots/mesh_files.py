@@ -13,9 +13,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from nmm.arrays import Array, Integers
-from nmm.files import read_bytes
-from nmm.text_format import one_line
+from nmm.base.arrays import Array, Integers
+from nmm.base.files import read_bytes
+from nmm.base.text_format import one_line
 
 if TYPE_CHECKING:
     import trimesh

@@ -14,10 +14,10 @@ from weakref import WeakValueDictionary
 import numpy as np
 import pinocchio as pin
 
-from nmm.findings import Finding
-from nmm.findings.robot_file import refusal
+from nmm.base.findings import Finding
+from nmm.base.findings.robot_file import refusal
+from nmm.base.text_format import one_line
 from nmm.robots.mesh_files import mesh_arrays
-from nmm.text_format import one_line
 
 # Read by now and in use: a mesh that several shapes or robots have is read once, and goes with the last.
 _IN_USE: WeakValueDictionary[tuple[object, ...], Any] = WeakValueDictionary()

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nmm.arrays import Array
-from nmm.errors import expect, expect_known
+from nmm.base.arrays import Array
+from nmm.base.errors import expect, expect_known
 
 #: How far a follower may be from its leader, and limits from meeting, rad or m: files have a few digits.
 SLACK = 1e-9

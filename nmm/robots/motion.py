@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array, Integers, array, matrix, unwritable, vector
-from nmm.errors import expect
+from nmm.base.arrays import Array, Integers, array, matrix, unwritable, vector
+from nmm.base.errors import expect
 from nmm.robots.robot import Robot
 from nmm.robots.surroundings import NO_SURROUNDINGS, Body, Surroundings
 

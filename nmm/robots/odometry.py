@@ -8,13 +8,13 @@ from collections.abc import Collection, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, matrix, scalar, vector
-from nmm.errors import InputError, expect_known, few, no_such
+from nmm.base.arrays import Array, matrix, scalar, vector
+from nmm.base.errors import InputError, expect_known, few, no_such
+from nmm.base.text_format import apart
 from nmm.robots.encoders import Turns
 from nmm.robots.robot import Robot
 from nmm.robots.wheel_rates import wheel_rates, wheel_shares
 from nmm.robots.zero_order_hold import HeldInputs
-from nmm.text_format import apart
 
 #: Where Gauss and Legendre look between two readings, for two looks.
 NODES = 0.5 - math.sqrt(3.0) / 6.0, 0.5 + math.sqrt(3.0) / 6.0

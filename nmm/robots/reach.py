@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.robots.robot import Robot
 
 #: What the frames at the end of an arm are called, the likeliest first.

@@ -12,11 +12,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array
-from nmm.errors import InputError, expect, few, no_such
-from nmm.findings import Finding
-from nmm.kernels.kinematics import Joints
-from nmm.lazy_call import lazy_call
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError, expect, few, no_such
+from nmm.base.findings import Finding
+from nmm.base.kernels.kinematics import Joints
+from nmm.base.lazy_call import lazy_call
 from nmm.platforms.base import Platform
 from nmm.robots.coordinates import Coordinates
 from nmm.robots.joint_table import joint_table, own_axes

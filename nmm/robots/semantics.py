@@ -6,8 +6,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from nmm.errors import no_such
-from nmm.findings import Finding
+from nmm.base.errors import no_such
+from nmm.base.findings import Finding
 
 #: Coordinates by name, m and rad, and under the key `posture` one or several postures.
 Named = Mapping[str, float | str | Sequence[str]]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
-from nmm.kernels.compiled import inlined
+from nmm.base.arrays import Array
+from nmm.base.kernels.compiled import inlined
 from nmm.platforms import Car, FrontDriveCar
 from nmm.robots.joint_table import twist
 from nmm.robots.robot import Robot

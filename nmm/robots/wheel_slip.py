@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.robots.robot import Robot
 from nmm.robots.wheel import Wheel
 from nmm.robots.wheel_rates import following, steered_by, wheel_rates

@@ -5,18 +5,18 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from nmm.arrays import Array, Integers
-from nmm.kernels.compiled import allocating, call_platform, checked_by_caller, clear, compiled, scratch
-from nmm.kernels.linear_algebra import copied
-from nmm.kernels.record_layout import IntegerVector, Memory, Vector, views
-from nmm.kernels.velocity_map import place_mimic_joints
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import allocating, call_platform, checked_by_caller, clear, compiled, scratch
+from nmm.base.kernels.linear_algebra import copied
+from nmm.base.kernels.record_layout import IntegerVector, Memory, Vector, views
+from nmm.base.kernels.velocity_map import place_mimic_joints
 from nmm.robots.robot import Robot
 
 
 class Inputs(NamedTuple):
     """What a robot's inputs move: the platform's first `coordinates` by its kernel, qp_dot = G(qp) up, and
     `parameters`; the coordinates `moved` (m - p,) by the arm's; `mimic_joints` (4 k,) as in
-    `nmm.kernels.velocity_map`."""
+    `nmm.base.kernels.velocity_map`."""
 
     platform: int
     parameters: Vector

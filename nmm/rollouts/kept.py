@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError, expect_known
+from nmm.base.files import whole_file, written_at
+from nmm.base.kernels.compiled import compiled, compiled_without_gil, scratch, view
+from nmm.base.kernels.spectra import write_spectrum
+from nmm.base.machine import expect_memory
 from nmm.control.quantities import saved
 from nmm.control.recorded import Recorded
-from nmm.errors import InputError, expect_known
-from nmm.files import whole_file, written_at
-from nmm.kernels.compiled import compiled, compiled_without_gil, scratch, view
-from nmm.kernels.spectra import write_spectrum
-from nmm.machine import expect_memory
 
 #: Quantities of a sample that can be kept, named as in a trajectory.
 QUANTITIES = (*(one.name for one in saved() if one.noted), "believed")

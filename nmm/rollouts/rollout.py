@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, Integers, counted, positive
+from nmm.base.arrays import Array, Integers, counted, positive
+from nmm.base.cores import cores
+from nmm.base.errors import InputError, expect, no_such
+from nmm.base.findings.run import line
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.integrators import Integrator, integrator
-from nmm.cores import cores
-from nmm.errors import InputError, expect, no_such
-from nmm.findings.run import line
 from nmm.rollouts.kept import MEASURES, Kept, measure
 from nmm.runs.clearance import guarded
 from nmm.runs.closed_loop import drive_loop

@@ -4,6 +4,6 @@ What reads works on the messages of rclpy and of the package rosbags, and on wha
 Frames are REP-105's (map, odom, the base), units REP-103's. Bags need the extra `ros`.
 """
 
-from nmm.lazy_names import attach
+from nmm.base.lazy_names import attach
 
 __getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.errors import InputError, expect
+from nmm.base.findings import Finding
 from nmm.control.quantities import saved
-from nmm.errors import InputError, expect
-from nmm.findings import Finding
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 from nmm.ros.recorded import Names, Recorded

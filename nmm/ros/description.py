@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.playback.placements import joint_screw
 from nmm.playback.sticks import appearance
 from nmm.robots.loading.provenance import provenance_of

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import Array, interpolated
-from nmm.errors import InputError
+from nmm.base.arrays import Array, interpolated
+from nmm.base.errors import InputError
 from nmm.robots.configuration import Configuration
 from nmm.runs.trajectory import Trajectory
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import Array, Integers, vector
-from nmm.errors import InputError, expect
+from nmm.base.arrays import Array, Integers, vector
+from nmm.base.errors import InputError, expect
 from nmm.robots.robot import Robot
 from nmm.ros.making import base_joint, root_link
 from nmm.ros.reading import name_of, nanoseconds, placement, plain, planar, velocities

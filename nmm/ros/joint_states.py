@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection
 from typing import Any
 
-from nmm.errors import expect
+from nmm.base.errors import expect
 from nmm.robots.robot import Robot
 from nmm.ros.reading import name_of, nanoseconds
 

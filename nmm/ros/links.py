@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.playback.placements import Placements, position_and_quaternion
 from nmm.robots.robot import Robot
 from nmm.ros.making import base_joint

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array, scalar
-from nmm.errors import InputError, expect, few
-from nmm.files import replaceable, whole_file, written_at
+from nmm.base.arrays import Array, scalar
+from nmm.base.errors import InputError, expect, few
+from nmm.base.files import replaceable, whole_file, written_at
 from nmm.playback.placements import position_and_quaternion, rolling_joints
 from nmm.playback.rolling import Rolling
 from nmm.robots.configuration import Configuration

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, array, matrix, scalar, vector
-from nmm.errors import InputError, expect
+from nmm.base.arrays import Array, array, matrix, scalar, vector
+from nmm.base.errors import InputError, expect
 from nmm.playback.placements import position_and_quaternion
 from nmm.robots.robot import Robot
 

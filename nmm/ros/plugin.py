@@ -1,6 +1,6 @@
 """The plugin for robots: loops at a robot's pace, odometry, and logs of ROS 2's messages."""
 
-from nmm.plugins import Plugin
+from nmm.base.plugins import Plugin
 
 PLUGIN = Plugin(
     "robot",

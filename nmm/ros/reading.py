@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, increasing, vector
-from nmm.errors import InputError, expect
+from nmm.base.arrays import Array, increasing, vector
+from nmm.base.errors import InputError, expect
 from nmm.robots.robot import Robot
 
 #: A platform whose z axis leans more, rad, is not read as one on level ground.
@@ -128,7 +128,7 @@ def base(message: Any, frame: str | None = None, child: str | None = None) -> Ar
     >>> nmm.ros.base(M(header=M(frame_id="odom"), pose=pose), frame="map")
     Traceback (most recent call last):
         ...
-    nmm.errors.InputError: SimpleNamespace: header.frame_id: expected 'map', got 'odom'
+    nmm.base.errors.InputError: SimpleNamespace: header.frame_id: expected 'map', got 'odom'
     """
     where, header = name_of(message), getattr(message, "header", None)
     given, about = getattr(header, "frame_id", None), getattr(message, "child_frame_id", None)

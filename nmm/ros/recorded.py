@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import vector
-from nmm.errors import InputError, expect
-from nmm.findings import Finding
+from nmm.base.arrays import vector
+from nmm.base.errors import InputError, expect
+from nmm.base.findings import Finding
 from nmm.robots.robot import Robot
 from nmm.ros import reading
 from nmm.ros.frames import Edge, Tree, carried, reference

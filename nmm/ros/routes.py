@@ -6,9 +6,9 @@ from functools import cached_property
 
 import numpy as np
 
-from nmm.arrays import Array, Flags, Integers
-from nmm.errors import InputError, no_such
-from nmm.findings import Finding
+from nmm.base.arrays import Array, Flags, Integers
+from nmm.base.errors import InputError, no_such
+from nmm.base.findings import Finding
 from nmm.ros.frames import Edge, Way, bare, fixed_frames, prefixed, reference
 from nmm.ros.reading import planar_rows
 from nmm.ros.recorded import Recorded

@@ -7,9 +7,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from nmm.errors import InputError, RunError
-from nmm.files import expect_file
-from nmm.findings import Finding
+from nmm.base.errors import InputError, RunError
+from nmm.base.files import expect_file
+from nmm.base.findings import Finding
 from nmm.ros.log import rosbags, typestore
 
 #: A topic and the type of its messages.

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from nmm.arrays import Array, Flags, Integers, interpolated
-from nmm.findings import Finding
+from nmm.base.arrays import Array, Flags, Integers, interpolated
+from nmm.base.findings import Finding
 
 #: Stamps that are the same for longer, in ns of recording, stand still.
 STANDS = 500_000_000

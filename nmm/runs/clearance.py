@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
 from nmm.collisions.obstacle import Obstacle, as_passed, shifts
 from nmm.collisions.scene import Scene
 from nmm.control.controller import Controller

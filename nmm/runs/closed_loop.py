@@ -9,14 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import DivergedError, RunError, SingularError
+from nmm.base.findings import Finding
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.integrators import Integrator
 from nmm.control.sample import Snapshot
 from nmm.control.step import Step
-from nmm.errors import DivergedError, RunError, SingularError
-from nmm.findings import Finding
 from nmm.runs.compiled_loop import DIVERGED_BEYOND, CompiledLoop, compiled_loop
 from nmm.runs.leg import Leaving
 from nmm.runs.recording import Recorder

@@ -12,7 +12,16 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import (
+    checked_by_caller,
+    compiled,
+    compiled_without_gil,
+    integer_scratch,
+    scratch,
+    view,
+)
+from nmm.base.kernels.record_layout import IntegerVector, Vector, keep, kept, put_back, record_type, views
 from nmm.control.controller import Controller
 from nmm.control.equations import ControlStep, call_step, watch_error
 from nmm.control.goal import Goal, norms, unit_codes
@@ -21,15 +30,6 @@ from nmm.control.recorded import Recorded, note_held, note_sample
 from nmm.control.step_size import Descent, call_shorten, shorten
 from nmm.control.stepping import Tableau, end_stages, go_on, tableau
 from nmm.functions.program import BESIDE
-from nmm.kernels.compiled import (
-    checked_by_caller,
-    compiled,
-    compiled_without_gil,
-    integer_scratch,
-    scratch,
-    view,
-)
-from nmm.kernels.record_layout import IntegerVector, Vector, keep, kept, put_back, record_type, views
 from nmm.resolvers.answer import SINGULAR_J
 from nmm.resolvers.base import State
 from nmm.resolvers.partitions import COLUMNS, FREE, HELD, MODE, OVERDUE, SIGN, PartitionState

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.control.quantities import RecordedQuantity
 from nmm.robots.robot import Robot
 from nmm.runs.trajectory import Trajectory

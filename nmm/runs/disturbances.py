@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, counted, positive, scalar
-from nmm.errors import InputError, expect, expect_known
-from nmm.kernels.record_layout import Matrix, Vector
+from nmm.base.arrays import Array, counted, positive, scalar
+from nmm.base.errors import InputError, expect, expect_known
+from nmm.base.kernels.record_layout import Matrix, Vector
 from nmm.robots.robot import Robot
 
 

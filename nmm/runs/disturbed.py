@@ -8,18 +8,18 @@ from dataclasses import dataclass, field
 import numpy as np
 from numba import types
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.errors import InputError
+from nmm.base.findings import Finding
+from nmm.base.kernels.compiled import checked_by_caller, compiled, compiled_without_gil, scratch, view
+from nmm.base.kernels.record_layout import record_type, views
 from nmm.control.controller import Controller
 from nmm.control.equations import ControlStep, write_equation
 from nmm.control.goal import Goal
 from nmm.control.integrators import Around, integrator
 from nmm.control.recorded import Recorded, note_sample
 from nmm.control.stepping import hold_inputs
-from nmm.errors import InputError
-from nmm.findings import Finding
 from nmm.functions.program import BESIDE, LaidOut, run_program
-from nmm.kernels.compiled import checked_by_caller, compiled, compiled_without_gil, scratch, view
-from nmm.kernels.record_layout import record_type, views
 from nmm.resolvers.answer import SINGULAR_J
 from nmm.resolvers.partitions import PartitionState
 from nmm.runs.closed_loop import drive_loop, finding_in

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.robots.robot import Robot
 from nmm.robots.zero_order_hold import HeldInputs
 

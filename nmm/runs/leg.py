@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.control.controller import Controller
 from nmm.control.integrators import Integrator
 from nmm.control.sequence import Schedule

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.control.controller import Controller
 
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import RunError
+from nmm.base.findings import Finding
+from nmm.base.kernels.compiled import checked_by_caller
 from nmm.control.controller import Controller
 from nmm.control.recorded import NOTE_SAMPLE, Recorded, note_sample, room
-from nmm.errors import RunError
-from nmm.findings import Finding
-from nmm.kernels.compiled import checked_by_caller
 from nmm.runs.recording import Recorder
 from nmm.runs.trajectory import Trajectory
 from nmm.runs.verdict import Verdict

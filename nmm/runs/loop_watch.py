@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 
-from nmm.arrays import Array, positive, scalar
+from nmm.base.arrays import Array, positive, scalar
 from nmm.control.controller import Controller
 from nmm.control.goal import norms, unit_codes
 from nmm.runs.far_limits import FarLimits

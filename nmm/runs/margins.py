@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nmm.arrays import Array, Flags
+from nmm.base.arrays import Array, Flags
 from nmm.control.limits import LimitsOn
 from nmm.functions.function import natural_size
 from nmm.robots.robot import Robot

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.control.goal import METRES, unit_codes
 from nmm.robots.robot import Robot
 from nmm.runs.held_history import HeldHistory

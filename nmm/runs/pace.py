@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 
 
 class Paced(Protocol):

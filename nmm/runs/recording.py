@@ -7,7 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.findings import Finding
+from nmm.base.kernels.compiled import checked_by_caller
+from nmm.base.kernels.spectra import spectra
+from nmm.base.machine import expect_memory
 from nmm.control.controller import Controller
 from nmm.control.limits import Limits
 from nmm.control.quantities import Record, saved
@@ -15,11 +19,7 @@ from nmm.control.recorded import NOTE_HELD, Recorded, note_held, room
 from nmm.control.safety_filter import Counts
 from nmm.control.sequence import Event
 from nmm.control.step import Step
-from nmm.findings import Finding
 from nmm.functions.program import COMPILED
-from nmm.kernels.compiled import checked_by_caller
-from nmm.kernels.spectra import spectra
-from nmm.machine import expect_memory
 from nmm.runs.clearance import Swept, swept
 from nmm.runs.margins import margin, shares, standing
 from nmm.runs.residuals import residuals

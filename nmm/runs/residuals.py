@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from nmm.arrays import Array
-from nmm.findings import Finding
+from nmm.base.arrays import Array
+from nmm.base.findings import Finding
 from nmm.resolvers.answer import EXACT
 
 

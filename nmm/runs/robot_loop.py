@@ -9,10 +9,10 @@ from collections.abc import Callable
 
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, positive, scalar
+from nmm.base.arrays import Array, positive, scalar
+from nmm.base.errors import InputError
+from nmm.base.findings import Finding
 from nmm.control.controller import Controller
-from nmm.errors import InputError
-from nmm.findings import Finding
 from nmm.runs.loop_clock import LoopClock
 from nmm.runs.loop_inputs import LoopInputs
 from nmm.runs.loop_log import LoopFindings, LoopLog

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import expect
 from nmm.control.limits import Limits
-from nmm.errors import expect
 from nmm.functions.function import Function, Sight
 from nmm.functions.program import Program
 from nmm.functions.tasks.image import optical_frame

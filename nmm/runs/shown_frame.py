@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nmm.arrays import Array
-from nmm.errors import expect
+from nmm.base.arrays import Array
+from nmm.base.errors import expect
 from nmm.functions.function import Function, Shown
 from nmm.functions.tasks.position import AXES
 from nmm.functions.tasks.task import Task

@@ -8,14 +8,15 @@ from dataclasses import replace
 
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, positive
+from nmm.base.arrays import Array, positive
+from nmm.base.errors import InputError, RunError, expect_kind
+from nmm.base.lazy_call import lazy_call
+from nmm.base.progress import between
+from nmm.base.text_format import listed
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.integrators import STEPPING, Integrator, integrator
 from nmm.control.sequence import Schedule
-from nmm.errors import InputError, RunError, expect_kind
-from nmm.lazy_call import lazy_call
-from nmm.progress import between
 from nmm.runs.closed_loop import finding_in
 from nmm.runs.disturbances import Disturbances, Disturbed
 from nmm.runs.disturbed import check_disturbed, drive_disturbed
@@ -25,7 +26,6 @@ from nmm.runs.recorded_run import Drive, record_run, sample_times
 from nmm.runs.recording import Recorder
 from nmm.runs.trajectory import Trajectory
 from nmm.runs.verdict import FindingLine, Outcome
-from nmm.text_format import listed
 
 #: The most samples that a run may have; beyond it the numbers do not fit in memory.
 MOST_SAMPLES = 20_000_000

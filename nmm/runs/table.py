@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nmm.base.errors import RunError
+from nmm.base.findings.run import MOTORS
+from nmm.base.text_format import apart
 from nmm.control.quantities import placed
-from nmm.errors import RunError
-from nmm.findings.run import MOTORS
-from nmm.text_format import apart
 
 if TYPE_CHECKING:
     from nmm.control.controller import Controller

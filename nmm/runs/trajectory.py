@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.ellipsoid_options import Wanted
+from nmm.base.errors import expect_known
+from nmm.base.figure_options import Drawn
+from nmm.base.findings import Finding
+from nmm.base.findings.run import line
+from nmm.base.lazy_call import lazy_call
+from nmm.base.machine import made_with
 from nmm.collisions.obstacle import Obstacle, obstacle_places
 from nmm.control.quantities import QUANTITIES, Record
 from nmm.control.sequence import Event
-from nmm.ellipsoid_options import Wanted
-from nmm.errors import expect_known
-from nmm.figure_options import Drawn
-from nmm.findings import Finding
-from nmm.findings.run import line
-from nmm.lazy_call import lazy_call
-from nmm.machine import made_with
 from nmm.robots.motion import Motion, Nearest
 from nmm.robots.robot import Robot
 from nmm.robots.surroundings import NO_SURROUNDINGS, Body, Surroundings
@@ -82,7 +82,7 @@ class Trajectory:
     scenario : the scenario as resolved, if it came from one
     events : when tasks that come and go began and ended, and why
     label : what it is called among other runs; "" for its resolver
-    made_with : the versions and the machine that computed it (`nmm.machine`); empty where a folder lacks them
+    made_with : the versions and the machine that computed it (`nmm.base.machine`); empty where a folder lacks them
     more : further recorded quantities by name; `trajectory[name]` is any of them
 
     Examples

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
-from nmm.findings import Finding
-from nmm.findings.run import MOTORS, line
+from nmm.base.findings import Finding
+from nmm.base.findings.run import MOTORS, line
 
 
 class Outcome(StrEnum):

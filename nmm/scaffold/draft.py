@@ -11,7 +11,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from nmm.errors import InputError, NmmError, RunError, ScenarioError
+from nmm.base.errors import InputError, NmmError, RunError, ScenarioError
+from nmm.base.text_format import one_line
 from nmm.robots.configuration import Configuration
 from nmm.robots.loading.ground import slip_warnings
 from nmm.robots.robot import Robot
@@ -23,7 +24,6 @@ from nmm.scaffold.start import Start, start_for
 from nmm.scaffold.text import text_of
 from nmm.scenario import Scenario
 from nmm.scenario.document import document_of
-from nmm.text_format import one_line
 
 #: At most this many scenarios are tried, for at most this many frames.
 _TRIES, _HANDS = 18, 3

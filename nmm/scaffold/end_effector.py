@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import Array
-from nmm.findings import Finding
+from nmm.base.arrays import Array
+from nmm.base.findings import Finding
+from nmm.base.text_format import counted
 from nmm.robots.reach import arm_branches, arm_end, reach
 from nmm.robots.robot import Robot
-from nmm.text_format import counted
 
 #: A range this small is none, m or rad.
 _NO_ROOM = 1e-6

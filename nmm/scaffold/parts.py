@@ -8,9 +8,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from nmm.bundled import bundled_robots
-from nmm.errors import InputError, RobotError, expect
-from nmm.files import named_folder
+from nmm.base.bundled import bundled_robots
+from nmm.base.errors import InputError, RobotError, expect
+from nmm.base.files import named_folder
 from nmm.robots.loading.provenance import PLATFORM_SOURCES, provenance_of
 from nmm.robots.robot import Robot
 from nmm.scenario.keys import first_error

@@ -9,9 +9,9 @@ from functools import cached_property
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError
 from nmm.dynamics.torques import Torques, torques_along
-from nmm.errors import InputError
 from nmm.robots.loading.provenance import accelerations_of
 from nmm.robots.robot import Robot
 

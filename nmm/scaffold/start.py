@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError, RobotError
 from nmm.collisions.pairs import HULLS, measured_pairs, query_shapes, random_configurations
-from nmm.errors import InputError, RobotError
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 from nmm.robots.semantics import POSTURE

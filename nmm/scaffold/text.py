@@ -6,8 +6,8 @@ from typing import Any
 
 import yaml
 
-from nmm.kinds import OBJECTIVES, REFERENCES, RESOLVERS, TASKS
-from nmm.text_format import printable
+from nmm.base.kinds import OBJECTIVES, REFERENCES, RESOLVERS, TASKS
+from nmm.base.text_format import printable
 
 WIDTH = 116
 

@@ -5,11 +5,11 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field, create_model
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError
 from nmm.collisions.obstacle import Obstacle
 from nmm.collisions.shapes import Box, Capsule, ConvexMesh, Cylinder, HalfSpace, Shape, Sphere
 from nmm.control.collisions import Collisions
-from nmm.errors import InputError
 from nmm.functions.function import Function
 from nmm.functions.program import Program
 from nmm.functions.references.orientation import rotation_vector

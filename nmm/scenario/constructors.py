@@ -34,7 +34,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticUndefined
 
-from nmm.errors import InputError
+from nmm.base.errors import InputError
 from nmm.functions.function import Function
 from nmm.robots.robot import Robot
 from nmm.scenario.keys import Part, at

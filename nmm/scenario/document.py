@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from nmm.errors import ScenarioError, Setting
-from nmm.files import read_bytes
+from nmm.base.errors import ScenarioError, Setting
+from nmm.base.files import read_bytes
+from nmm.base.text_format import listed
 from nmm.scenario.keys import is_path
 from nmm.scenario.yaml_text import LONGEST, Place, dotted, read_text
-from nmm.text_format import listed
 
 #: Where one mapping may stand for a list of one: its index 0 is the mapping.
 _ONE_OR_MORE = ("task", "objective", "added_task")

@@ -24,9 +24,9 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, ErrorDetails
 
-from nmm.errors import E, InputError, NmmError, ScenarioError, expect_known, no_such
+from nmm.base.errors import E, InputError, NmmError, ScenarioError, expect_known, no_such
+from nmm.base.text_format import quoted
 from nmm.scenario.yaml_text import Place
-from nmm.text_format import quoted
 
 P = TypeVar("P")
 T = TypeVar("T")

@@ -5,12 +5,12 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
 
+from nmm.base.errors import InputError
 from nmm.control.goal import Goal
 from nmm.control.limited_function import Bound
 from nmm.control.limits import Limits
 from nmm.control.retreat import Retreat
 from nmm.control.steering import Steering
-from nmm.errors import InputError
 from nmm.robots.robot import Robot
 from nmm.scenario.constructors import FunctionPart, MadePart, keys_of
 from nmm.scenario.functions import with_functions

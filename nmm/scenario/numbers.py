@@ -15,8 +15,8 @@ from simpleeval import (  # type: ignore[import-untyped]  # it has no annotation
     SimpleEval,
 )
 
-from nmm.errors import InputError, ScenarioError
-from nmm.text_format import quoted
+from nmm.base.errors import InputError, ScenarioError
+from nmm.base.text_format import quoted
 
 #: Numbers, or lists of them to any depth, as plain data.
 Nested = float | list[Any]

@@ -7,12 +7,12 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
+from nmm.base.kinds import OBJECTIVES
 from nmm.control.collisions import Collisions
 from nmm.functions.function import Function
 from nmm.functions.objectives.base import Objective
 from nmm.functions.objectives.clearance import Clearance
 from nmm.functions.objectives.coordinates import Quadratic, QuadraticTerm
-from nmm.kinds import OBJECTIVES
 from nmm.robots.robot import Robot
 from nmm.scenario.constructors import (
     Combination,

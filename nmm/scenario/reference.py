@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from pydantic_core import PydanticUndefined
 
-from nmm.kinds import REFERENCES, RESOLVERS, TASKS
+from nmm.base.kinds import REFERENCES, RESOLVERS, TASKS
 from nmm.scenario.collisions import SHAPE_PARTS, CollisionsPart, ObstaclePart
 from nmm.scenario.disturbances import DisturbancesPart
 from nmm.scenario.functions import FUNCTION_PARTS, REFERENCE_PARTS, CameraFaultsPart

@@ -6,13 +6,13 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from nmm.errors import InputError
-from nmm.kinds import RESOLVERS
+from nmm.base.errors import InputError
+from nmm.base.kinds import RESOLVERS
+from nmm.base.text_format import listed as in_words
 from nmm.scenario.constructors import MadePart, part_of
 from nmm.scenario.keys import KeyedError, OneOf
 from nmm.scenario.numbers import Positive, integer
 from nmm.scenario.tasks import TaskList, listed
-from nmm.text_format import listed as in_words
 
 
 class ResolverPart(MadePart):

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WrapValidator, model_validator
 
-from nmm.errors import InputError, expect_known
-from nmm.files import named_folder
+from nmm.base.errors import InputError, expect_known
+from nmm.base.files import named_folder
 from nmm.scenario.keys import KeyedError, Part, at
 from nmm.scenario.numbers import Number, number, numbers, numbers_by_name
 from nmm.scenario.yaml_text import Place

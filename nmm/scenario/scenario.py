@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 from pydantic import ValidationError
 
-from nmm.errors import ScenarioError, no_such
-from nmm.findings import Finding
-from nmm.progress import Progress
+from nmm.base.errors import ScenarioError, no_such
+from nmm.base.findings import Finding
+from nmm.base.progress import Progress
 from nmm.robots.surroundings import Surroundings
 from nmm.scenario.document import Document, read_file
 from nmm.scenario.keys import KeyedError, NamedReferences, as_written, at, first_error
@@ -293,7 +293,7 @@ def _with_settings(document: Document, settings: Mapping[str, object]) -> Docume
 
 def _find(name_or_path: str | Path) -> Path:
     """The file of a bundled name or a path."""
-    from nmm.bundled import bundled_scenarios
+    from nmm.base.bundled import bundled_scenarios
 
     path = Path(name_or_path).expanduser()
     bundled = bundled_scenarios()

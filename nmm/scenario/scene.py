@@ -5,9 +5,9 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, Field
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError, expect_known
 from nmm.collisions.obstacle import Obstacle
-from nmm.errors import InputError, expect_known
 from nmm.functions.references.orientation import rotation_vector
 from nmm.robots.robot import Robot
 from nmm.robots.surroundings import Body, Carried, Surroundings

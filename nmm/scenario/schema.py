@@ -6,16 +6,17 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, create_model
 
+from nmm.base.errors import InputError, Setting, expect_known, few
+from nmm.base.kinds import RESOLVERS
+from nmm.base.plugins import Addition
+from nmm.base.progress import Progress
+from nmm.base.text_format import listed as in_words
 from nmm.control.collisions import Collisions
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.sequence import Sequence
 from nmm.control.sequenced import SequencedController
-from nmm.errors import InputError, Setting, expect_known, few
 from nmm.functions.tasks.task import Stack
-from nmm.kinds import RESOLVERS
-from nmm.plugins import Addition
-from nmm.progress import Progress
 from nmm.resolvers.base import Resolver
 from nmm.robots.robot import Robot
 from nmm.robots.semantics import POSTURE
@@ -31,7 +32,6 @@ from nmm.scenario.robot import Absolute, RobotChoice
 from nmm.scenario.scene import ScenePart
 from nmm.scenario.sections import Making, Motion, Section, about, section_class, section_names
 from nmm.scenario.tasks import TASK_PARTS, TaskList, TaskPart, build_tasks, listed
-from nmm.text_format import listed as in_words
 
 
 def start_of(value: object) -> dict[str, Any] | list[Nested]:

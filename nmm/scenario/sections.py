@@ -10,11 +10,11 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
-from nmm.errors import InputError
-from nmm.findings import Finding
+from nmm.base.errors import InputError
+from nmm.base.findings import Finding
+from nmm.base.plugins import Addition, additions, complain
+from nmm.base.progress import Progress
 from nmm.functions.tasks.task import Task
-from nmm.plugins import Addition, additions, complain
-from nmm.progress import Progress
 from nmm.robots.robot import Robot
 from nmm.scenario.keys import KeyedError, Part
 

@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from nmm.errors import InputError, expect, expect_known
+from nmm.base.errors import InputError, expect, expect_known
+from nmm.base.kinds import TASKS
+from nmm.base.text_format import counted, listed
 from nmm.functions.function import Function
 from nmm.functions.program import evaluate
 from nmm.functions.tasks.task import Task
-from nmm.kinds import TASKS
 from nmm.robots.configuration import Configuration
 from nmm.robots.reach import arm_branches, arm_end
 from nmm.robots.robot import Robot
@@ -19,7 +20,6 @@ from nmm.scenario.functions import FUNCTION_PARTS
 from nmm.scenario.keys import KeyedError, as_written, first_error
 from nmm.scenario.tasks import TASK_PARTS
 from nmm.scenario.yaml_text import dotted, read_text
-from nmm.text_format import counted, listed
 
 #: What a text may be.
 EXPECTED = "KIND:FRAME:AXES, as in position:ee:xy, or a mapping as in a scenario"

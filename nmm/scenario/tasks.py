@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field
 
-from nmm.errors import InputError, expect_known, few
+from nmm.base.errors import InputError, expect_known, few
 from nmm.functions.function import Row
 from nmm.functions.tasks.conditions import After, Between, Condition, While
 from nmm.functions.tasks.task import Task

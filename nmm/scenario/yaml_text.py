@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from nmm.errors import ScenarioError
-from nmm.text_format import quoted
+from nmm.base.errors import ScenarioError
+from nmm.base.text_format import quoted
 
 #: Where a value stands: mapping keys and list indices, from the top.
 Place = tuple[str | int, ...]

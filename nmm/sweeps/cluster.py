@@ -9,9 +9,9 @@ from itertools import islice
 from typing import Any
 
 from nmm import __version__
-from nmm.errors import InputError, NmmError, RunError, expect
+from nmm.base.errors import InputError, NmmError, RunError, expect
+from nmm.base.text_format import listed
 from nmm.sweeps.rows import Computed, needed
-from nmm.text_format import listed
 
 #: How long a scheduler may take to answer and to have a worker, s.
 PATIENCE = 10.0

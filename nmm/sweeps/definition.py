@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from nmm.arrays import Array
-from nmm.errors import InputError, expect
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError, expect
+from nmm.base.text_format import split_outside_brackets
 from nmm.scenario import Scenario
 from nmm.scenario.document import Document
 from nmm.scenario.numbers import evaluate, number
-from nmm.text_format import split_outside_brackets
 
 #: What may be kept of a rollout besides its row.
 KEPT = ("trajectories", "playback")

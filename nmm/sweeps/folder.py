@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from nmm.errors import InputError
-from nmm.files import taken, whole_file, written_at
+from nmm.base.errors import InputError
+from nmm.base.files import taken, whole_file, written_at
 from nmm.folders.whole import FolderKind, check_folder
 from nmm.scenario.numbers import shown
 from nmm.sweeps.definition import Definition

@@ -1,6 +1,6 @@
 """The plugin for sweeps: a scenario run many times, over ranges of its keys."""
 
-from nmm.plugins import Plugin
+from nmm.base.plugins import Plugin
 
 PLUGIN = Plugin(
     "sweeps",

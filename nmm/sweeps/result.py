@@ -12,13 +12,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from nmm.arrays import Array, finite
-from nmm.files import whole_file
-from nmm.resolver_style import resolver_styles
+from nmm.base.arrays import Array, finite
+from nmm.base.files import whole_file
+from nmm.base.resolver_style import resolver_styles
+from nmm.base.templates import template
+from nmm.base.text_format import listed
 from nmm.sweeps.definition import Definition
 from nmm.sweeps.rows import Column, columns_of, parquet
-from nmm.templates import template
-from nmm.text_format import listed
 
 #: Quantities of all rollouts.
 QUANTITIES = (

@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 
 from nmm import __version__
+from nmm.base.errors import InputError, RunError
+from nmm.base.progress import Progress
 from nmm.control.quantities import placed
 from nmm.diagnosis.summary import RUN_NUMBERS
-from nmm.errors import InputError, RunError
-from nmm.progress import Progress
 from nmm.scenario import Scenario
 from nmm.sweeps.definition import Definition, Listed
 

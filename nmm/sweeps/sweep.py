@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from nmm import __version__
-from nmm.arrays import counted
-from nmm.bundled import bundled_scenarios, bundled_sweeps
-from nmm.cores import cores
-from nmm.errors import InputError, ScenarioError, expect, expect_known
-from nmm.processes import as_done
-from nmm.progress import Progress
+from nmm.base.arrays import counted
+from nmm.base.bundled import bundled_scenarios, bundled_sweeps
+from nmm.base.cores import cores
+from nmm.base.errors import InputError, ScenarioError, expect, expect_known
+from nmm.base.processes import as_done
+from nmm.base.progress import Progress
+from nmm.base.text_format import listed
 from nmm.scenario import Scenario
 from nmm.scenario.document import read_file
 from nmm.scenario.numbers import number
@@ -36,7 +37,6 @@ from nmm.sweeps.definition import (
 from nmm.sweeps.folder import SweepFolder, check_size, is_sweep
 from nmm.sweeps.result import SweepResult, write_page
 from nmm.sweeps.rows import MEASURED, computed, wholly_compiled
-from nmm.text_format import listed
 
 #: Up to this many rows a core, threads compute them; for more, processes pay.
 FEW_ROWS = 128

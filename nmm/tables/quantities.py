@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nmm.base.errors import expect
+from nmm.base.latex import escaped
 from nmm.control.quantities import named_numbers
 from nmm.diagnosis.summary import RUN_NUMBERS
-from nmm.errors import expect
-from nmm.latex import escaped
 from nmm.tables.table import Quantity, Table, Value
 
 if TYPE_CHECKING:

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
-from nmm import latex
-from nmm.errors import expect
-from nmm.files import written_at
-from nmm.text_format import listed, number_text, printable
+from nmm.base import latex
+from nmm.base.errors import expect
+from nmm.base.files import written_at
+from nmm.base.text_format import listed, number_text, printable
 
 #: A number, a word, or None where a run has none.
 Value: TypeAlias = float | int | str | None

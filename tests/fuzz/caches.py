@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from nmm.arrays import Array
-from nmm.kernels import cache
-from nmm.kernels.compiled import compiled
+from nmm.base.arrays import Array
+from nmm.base.kernels import cache
+from nmm.base.kernels.compiled import compiled
 
 from .hunting import Hunt
 from .mutants import CUTS, damaged

@@ -17,8 +17,8 @@ from unittest.mock import patch
 
 from hypothesis import strategies as st
 
+from nmm.base.errors import RunError
 from nmm.cli.exit_status import status_of
-from nmm.errors import RunError
 from nmm.rendering.chromium import find_browser
 from nmm.rendering.encoder import find_ffmpeg
 

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
+from nmm.base.errors import NmmError
 from nmm.cli.playing import runs_in
-from nmm.errors import NmmError
 from nmm.playback.html import page_of
 
 from .damaging import copied, damage, whole_folders

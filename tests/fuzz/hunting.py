@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, Phase, find, given, settings
 from hypothesis import strategies as st
 from hypothesis.errors import NoSuchExample
 
-from nmm.errors import NmmError
+from nmm.base.errors import NmmError
 
 KEPT = Path(__file__).parent / "kept"
 #: An error is read by a person: one line, and not a page.

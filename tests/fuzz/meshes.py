@@ -13,7 +13,7 @@ import trimesh
 from hypothesis import strategies as st
 
 import nmm
-from nmm.errors import NmmError
+from nmm.base.errors import NmmError
 from nmm.figures.silhouette import platform_shapes
 from nmm.playback.shapes import shapes
 

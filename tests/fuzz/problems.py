@@ -9,8 +9,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 import nmm
-from nmm.errors import NmmError
-from nmm.kinds import RESOLVERS
+from nmm.base.errors import NmmError
+from nmm.base.kinds import RESOLVERS
 
 from .hunting import Hunt, refused
 from .truth import truthful

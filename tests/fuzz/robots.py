@@ -14,8 +14,8 @@ import xacro
 from hypothesis import strategies as st
 
 import nmm
-from nmm.bundled import bundled_robots
-from nmm.errors import NmmError
+from nmm.base.bundled import bundled_robots
+from nmm.base.errors import NmmError
 
 from .hunting import Hunt, refused
 from .mutants import CUTS, VALUES, damaged

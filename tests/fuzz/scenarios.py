@@ -11,8 +11,8 @@ import yaml
 from hypothesis import strategies as st
 
 import nmm
-from nmm.bundled import bundled_scenarios
-from nmm.errors import NmmError
+from nmm.base.bundled import bundled_scenarios
+from nmm.base.errors import NmmError
 
 from .hunting import Hunt, refused
 from .mutants import CHANGES, changed

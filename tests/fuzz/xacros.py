@@ -11,7 +11,7 @@ from typing import Any
 from hypothesis import strategies as st
 
 import nmm
-from nmm.errors import NmmError
+from nmm.base.errors import NmmError
 from nmm.scenario.numbers import number
 
 from .hunting import Hunt, refused

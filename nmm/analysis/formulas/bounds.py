@@ -12,8 +12,8 @@ from nmm.analysis.formulas.claims import NOTHING, Claim
 from nmm.analysis.formulas.expressions import Product, Sum, Symbol, Trig, alone, inline, is_constant, to_sympy
 from nmm.analysis.formulas.readable import condition, expanded
 from nmm.analysis.formulas.symbolic_analysis import SymbolicAnalysis
-from nmm.findings import Finding
-from nmm.latex import Formula, formula, linear_formula, minor_name, symbol
+from nmm.base.findings import Finding
+from nmm.base.latex import Formula, formula, linear_formula, minor_name, symbol
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ from nmm.analysis.formulas.expressions import (
 from nmm.analysis.formulas.readable import condition, factored, in_names
 from nmm.analysis.formulas.symbolic_analysis import SymbolicAnalysis
 from nmm.analysis.formulas.zeros import Basis, Limits, Undecided, Zeros
-from nmm.findings import Finding
-from nmm.latex import Formula
+from nmm.base.findings import Finding
+from nmm.base.latex import Formula
 
 #: Smaller values are rounding, also by a file's digits, and count as zero.
 NOTHING = 1e-9

@@ -15,8 +15,8 @@ from nmm.analysis.formulas.quotient import Quotient, Untraceable, common_multipl
 from nmm.analysis.formulas.task_rows import TracedRow, task_rows
 from nmm.analysis.formulas.tracing import traced
 from nmm.analysis.formulas.written import Auxiliary, Value, value_without
-from nmm.errors import InputError, expect, expect_known
-from nmm.findings import Finding
+from nmm.base.errors import InputError, expect, expect_known
+from nmm.base.findings import Finding
 from nmm.functions.tasks.task import Stack
 from nmm.platforms.base import Platform
 from nmm.robots.robot import Robot

@@ -13,7 +13,7 @@ from typing import Any
 
 import flint
 
-from nmm.errors import InputError
+from nmm.base.errors import InputError
 
 #: Powers of the variables in a term, by their index, sorted; an angle's power is its factor in the exponent.
 Key = tuple[tuple[int, int], ...]

@@ -10,8 +10,8 @@ from typing import Any
 
 import sympy
 
-from nmm.latex import Formula, symbol
-from nmm.text_format import signed_sum
+from nmm.base.latex import Formula, symbol
+from nmm.base.text_format import signed_sum
 
 
 @dataclass(frozen=True)

@@ -28,9 +28,9 @@ from nmm.analysis.formulas.geometry import (
 )
 from nmm.analysis.formulas.quotient import Linear, Quotient, Untraceable
 from nmm.analysis.formulas.written import Auxiliary
-from nmm.arrays import Array
-from nmm.errors import InputError
-from nmm.kernels import records
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError
+from nmm.base.kernels import records
 from nmm.robots.robot import CENTER_OF_MASS, Robot
 
 

@@ -13,7 +13,7 @@ from nmm.analysis.formulas.geometry import Geometry
 from nmm.analysis.formulas.symbolic_analysis import SymbolicAnalysis, assembled, too_large_explained
 from nmm.analysis.formulas.task_rows import frames_of
 from nmm.analysis.singular.jacobians import Jacobians, Tasks, stacked
-from nmm.errors import InputError, NmmError, SingularError, expect_known
+from nmm.base.errors import InputError, NmmError, SingularError, expect_known
 from nmm.functions.tasks.task import Stack
 from nmm.robots.robot import Robot
 

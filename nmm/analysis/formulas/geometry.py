@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from nmm.analysis.formulas.expansion import Expansion, Ring, exact
-from nmm.arrays import Array
-from nmm.errors import InputError
-from nmm.findings import Finding
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError
+from nmm.base.findings import Finding
 
 Vector = list[Expansion]
 

@@ -1,6 +1,6 @@
 """The plugin that derives J and its minors as formulas, and searches singular configurations."""
 
-from nmm.plugins import Plugin
+from nmm.base.plugins import Plugin
 
 PLUGIN = Plugin(
     "symbolic",

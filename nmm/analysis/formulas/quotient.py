@@ -14,7 +14,7 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from nmm.analysis.formulas.expansion import Expansion, Ring, exact
 from nmm.analysis.formulas.geometry import Geometry
-from nmm.errors import InputError
+from nmm.base.errors import InputError
 
 #: How far from a multiple of π/2 a fixed angle may be and still be one, rad.
 _SQUARE = 1e-9

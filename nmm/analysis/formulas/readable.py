@@ -21,7 +21,7 @@ from nmm.analysis.formulas.expressions import (
     is_constant,
 )
 from nmm.analysis.formulas.trigonometric_factors import factors_of
-from nmm.latex import Formula, symbol
+from nmm.base.latex import Formula, symbol
 
 #: Names of factors that several minors have, in the order in which they are given.
 FACTOR_NAMES = ("Lambda", "Gamma", "Phi", "Psi", "Omega")

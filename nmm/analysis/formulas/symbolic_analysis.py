@@ -27,11 +27,11 @@ from nmm.analysis.formulas.written import (
     written,
 )
 from nmm.analysis.singular.minors import column_indices, permutation_sign
-from nmm.arrays import Array, scalar
-from nmm.errors import expect, expect_known
-from nmm.findings import Finding
-from nmm.kernels.rotations import log3
-from nmm.latex import Formula, minor_name, symbol
+from nmm.base.arrays import Array, scalar
+from nmm.base.errors import expect, expect_known
+from nmm.base.findings import Finding
+from nmm.base.kernels.rotations import log3
+from nmm.base.latex import Formula, minor_name, symbol
 from nmm.robots.robot import Robot
 
 #: Minors that are 0 are counted, not listed, if they are at least so many.

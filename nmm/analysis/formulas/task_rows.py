@@ -13,7 +13,10 @@ from nmm.analysis.formulas.quotient import Linear, Quotient, Untraceable, quotie
 from nmm.analysis.formulas.tracing import traced
 from nmm.analysis.formulas.written import Arc, Share, Turn, Value
 from nmm.analysis.singular.jacobians import Reached
-from nmm.errors import InputError
+from nmm.base.errors import InputError
+from nmm.base.kernels import records
+from nmm.base.kernels.records import Frames as Read
+from nmm.base.kernels.records import Rows
 from nmm.functions.function import Function, Stage
 from nmm.functions.references.circle import bearing
 from nmm.functions.tasks import Stack
@@ -21,9 +24,6 @@ from nmm.functions.tasks.image import image_points, log_depth
 from nmm.functions.tasks.pointing import pointing
 from nmm.functions.tasks.pose import frame_pose, orientation_error, pose_error
 from nmm.functions.tasks.position import distance
-from nmm.kernels import records
-from nmm.kernels.records import Frames as Read
-from nmm.kernels.records import Rows
 from nmm.robots.robot import CENTER_OF_MASS, Robot
 
 #: For errors that are logarithms, the rows of the frame's velocity, linear over angular, that J has at 0.

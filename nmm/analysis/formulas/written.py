@@ -11,7 +11,7 @@ from nmm.analysis.formulas.expansion import Expansion
 from nmm.analysis.formulas.expressions import Product, Sum, Symbol, alone, shown, to_sympy
 from nmm.analysis.formulas.quotient import Linear
 from nmm.analysis.formulas.readable import as_sum, factored
-from nmm.latex import Formula, formula
+from nmm.base.latex import Formula, formula
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from nmm.analysis.maps.measures import Evaluator, Judged, Smallness
 from nmm.analysis.maps.result import About, Map
 from nmm.analysis.maps.singular_set import SingularSet, singular_set
 from nmm.analysis.singular.jacobians import Subject
-from nmm.arrays import Array, counted, vector
-from nmm.errors import InputError, expect
-from nmm.progress import Progress, between
+from nmm.base.arrays import Array, counted, vector
+from nmm.base.errors import InputError, expect
+from nmm.base.progress import Progress, between
 from nmm.robots.robot import Robot
 
 #: Most nodes of a map in all; for more there is no picture, and soon no memory.

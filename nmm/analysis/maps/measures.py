@@ -15,12 +15,12 @@ import numpy as np
 from nmm.analysis.singular.jacobians import Jacobians, Subject
 from nmm.analysis.singular.parts import WHOLE, expect_inputs, groups, ranks, singular_values, some_columns
 from nmm.analysis.singular.singularity import TOLERANCE
-from nmm.arrays import Array, Integers, scalar
-from nmm.errors import expect, expect_known
-from nmm.progress import Progress, between
+from nmm.base.arrays import Array, Integers, scalar
+from nmm.base.errors import expect, expect_known
+from nmm.base.progress import Progress, between
+from nmm.base.text_format import superscript
 from nmm.resolvers.base import Weights, weight_diagonal
 from nmm.resolvers.problem import Dimensions
-from nmm.text_format import superscript
 
 #: So many configurations' J are held at a time.
 CHUNK = 1 << 14

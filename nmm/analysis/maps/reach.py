@@ -7,15 +7,15 @@ from typing import NamedTuple
 import numpy as np
 
 from nmm.analysis.maps.coordinates import checked_range, usual_range
-from nmm.arrays import Array, Flags, Integers
-from nmm.cores import over_cores
-from nmm.errors import expect, expect_known
-from nmm.kernels.compiled import clear, compiled, compiled_without_gil, scratch, view
-from nmm.kernels.kinematics import Kinematics, place_frames
-from nmm.kernels.linear_algebra import eliminate
-from nmm.kernels.record_layout import IntegerVector, Matrix, Vector, views
-from nmm.kernels.velocity_map import place_mimic_joints
-from nmm.progress import Progress
+from nmm.base.arrays import Array, Flags, Integers
+from nmm.base.cores import over_cores
+from nmm.base.errors import expect, expect_known
+from nmm.base.kernels.compiled import clear, compiled, compiled_without_gil, scratch, view
+from nmm.base.kernels.kinematics import Kinematics, place_frames
+from nmm.base.kernels.linear_algebra import eliminate
+from nmm.base.kernels.record_layout import IntegerVector, Matrix, Vector, views
+from nmm.base.kernels.velocity_map import place_mimic_joints
+from nmm.base.progress import Progress
 from nmm.robots.frame_path import FramePath
 from nmm.robots.robot import Robot
 
@@ -33,7 +33,7 @@ class Plane(NamedTuple):
     slab (2,) : range of the third, m; -inf and inf where it is free
     moving, lower, upper (k,) : columns of q that are varied, and their ranges
     carried (n, k) : what a unit of each of them moves, mimic joints included
-    mimic_joints (4 f,) : see `nmm.kernels.velocity_map`
+    mimic_joints (4 f,) : see `nmm.base.kernels.velocity_map`
     """
 
     axes: IntegerVector

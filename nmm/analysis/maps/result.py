@@ -12,9 +12,9 @@ import numpy as np
 from nmm.analysis.maps.measures import MEASURES, Evaluator, unit_of
 from nmm.analysis.maps.singular_set import SingularSet
 from nmm.analysis.singular.parts import WHOLE
-from nmm.arrays import Array, Integers
-from nmm.figure_options import PLAIN, FigureOptions
-from nmm.lazy_call import lazy_call
+from nmm.base.arrays import Array, Integers
+from nmm.base.figure_options import PLAIN, FigureOptions
+from nmm.base.lazy_call import lazy_call
 from nmm.robots.robot import Robot
 
 if TYPE_CHECKING:

@@ -10,10 +10,10 @@ import numpy as np
 
 from nmm.analysis.maps.measures import Evaluator
 from nmm.analysis.maps.reach import Reach
-from nmm.arrays import Array, Flags, Integers
-from nmm.errors import InputError
-from nmm.kernels.compiled import compiled
-from nmm.progress import Progress, between
+from nmm.base.arrays import Array, Flags, Integers
+from nmm.base.errors import InputError
+from nmm.base.kernels.compiled import compiled
+from nmm.base.progress import Progress, between
 
 #: Sides of the blocks, in cells, through which good postures spread. In each sweep, a block's best posture is
 #: tried in the blocks beside it that are worse by more than this share; there are many small blocks.

@@ -17,10 +17,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nmm.analysis.singular.singularity import TOLERANCE
-from nmm.arrays import Array, Integers
-from nmm.cores import over_cores
-from nmm.kernels.spectra import spectra
-from nmm.progress import Progress
+from nmm.base.arrays import Array, Integers
+from nmm.base.cores import over_cores
+from nmm.base.kernels.spectra import spectra
+from nmm.base.progress import Progress
 
 #: Central differences, in cells of the grid.
 STEP = 1e-4

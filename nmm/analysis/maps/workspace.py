@@ -15,9 +15,9 @@ from nmm.analysis.maps.result import About, Map
 from nmm.analysis.maps.search import Search
 from nmm.analysis.maps.singular_set import SingularSet, curves_and_points, polish
 from nmm.analysis.singular.jacobians import Subject
-from nmm.arrays import Array, Integers, counted
-from nmm.errors import InputError, expect
-from nmm.progress import Progress, between
+from nmm.base.arrays import Array, Integers, counted
+from nmm.base.errors import InputError, expect
+from nmm.base.progress import Progress, between
 from nmm.robots.frame_path import FramePath
 
 #: Postures drawn, and how many of them are led to a singular one each to draw these.

@@ -17,15 +17,15 @@ from typing import TYPE_CHECKING, TypeAlias, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, Integers, counted, positive
+from nmm.base.arrays import Array, Integers, counted, positive
+from nmm.base.errors import InputError, expect, no_such
+from nmm.base.findings import Finding
+from nmm.base.kernels.rotations import exp3
+from nmm.base.progress import Progress, between
 from nmm.control.controller import Controller
-from nmm.errors import InputError, expect, no_such
-from nmm.findings import Finding
 from nmm.functions.function import Function
 from nmm.functions.program import evaluate
 from nmm.functions.references import Bearing, Circle, PiecewisePolynomial, PoseReference
-from nmm.kernels.rotations import exp3
-from nmm.progress import Progress, between
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 from nmm.runs.simulation import simulate

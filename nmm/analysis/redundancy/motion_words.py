@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
+from nmm.base.text_format import listed
 from nmm.robots.configuration import Configuration
 from nmm.robots.reach import tips
 from nmm.robots.robot import Robot
-from nmm.text_format import listed
 
 #: An axis is upright when its vertical component is larger than this.
 UPRIGHT = 0.95

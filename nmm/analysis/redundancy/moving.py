@@ -26,19 +26,20 @@ from nmm.analysis.redundancy.null_fields import (
 )
 from nmm.analysis.singular.jacobians import Jacobians, Reached, Subject, checked
 from nmm.analysis.singular.singularity import TOLERANCE
-from nmm.arrays import Array, positive
+from nmm.base.arrays import Array, positive
+from nmm.base.errors import InputError, SingularError, expect
+from nmm.base.findings import Finding
+from nmm.base.kernels.compiled import checked_by_caller
+from nmm.base.kernels.record_layout import views
+from nmm.base.text_format import listed
 from nmm.control.controller import Controller
 from nmm.control.equations import ControlStep
 from nmm.control.integrators import RK4
 from nmm.control.step import Step
 from nmm.diagnosis.diagnose import lines, noticed
-from nmm.errors import InputError, SingularError, expect
-from nmm.findings import Finding
 from nmm.functions.program import BESIDE, COMPILED, evaluate
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.task import Stack, Task
-from nmm.kernels.compiled import checked_by_caller
-from nmm.kernels.record_layout import views
 from nmm.resolvers.answer import Status
 from nmm.resolvers.projected_gradient import ProjectedGradient
 from nmm.robots.configuration import Configuration
@@ -46,7 +47,6 @@ from nmm.robots.robot import Robot
 from nmm.runs.recording import Recorder
 from nmm.runs.trajectory import Trajectory
 from nmm.runs.verdict import Outcome, Verdict
-from nmm.text_format import listed
 
 #: How fast the task is brought back from the integrator's drift, 1/s.
 GAIN = 10.0

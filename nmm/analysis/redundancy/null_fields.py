@@ -10,13 +10,13 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, Flags, Integers, scalar, vector
+from nmm.base.arrays import Array, Flags, Integers, scalar, vector
+from nmm.base.errors import InputError, expect, expect_known
+from nmm.base.kernels.compiled import checked_by_caller, compiled, integer_scratch, scratch
+from nmm.base.kernels.linear_algebra import residual_norm, singular_rows
+from nmm.base.kernels.record_layout import IntegerVector, Vector, record_type, views
 from nmm.control.equations import ControlStep, drive
-from nmm.errors import InputError, expect, expect_known
 from nmm.functions.program import BESIDE, LaidOut
-from nmm.kernels.compiled import checked_by_caller, compiled, integer_scratch, scratch
-from nmm.kernels.linear_algebra import residual_norm, singular_rows
-from nmm.kernels.record_layout import IntegerVector, Vector, record_type, views
 from nmm.robots.robot import Robot
 
 #: The motion ends where a singular value that it needs is below this part of the largest.

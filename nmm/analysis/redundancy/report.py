@@ -14,12 +14,12 @@ from nmm.analysis.redundancy.null_fields import readable_null_space
 from nmm.analysis.singular.jacobians import Jacobians, Subject, checked
 from nmm.analysis.singular.parts import null_space, rank_of
 from nmm.analysis.singular.singularity import TOLERANCE
-from nmm.arrays import Array, positive
+from nmm.base.arrays import Array, positive
+from nmm.base.errors import SingularError
+from nmm.base.findings import Finding
 from nmm.control.controller import Controller
 from nmm.control.directions import direction_text
 from nmm.control.idle_inputs import inputs_without_effect
-from nmm.errors import SingularError
-from nmm.findings import Finding
 from nmm.functions.program import Program
 from nmm.functions.tasks.task import Comparison
 from nmm.resolvers.projected_gradient import ProjectedGradient

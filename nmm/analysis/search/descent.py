@@ -10,8 +10,8 @@ from scipy.optimize import Bounds, minimize
 
 from nmm.analysis.search.space import ROUNDING, Search
 from nmm.analysis.singular.parts import null_space
-from nmm.arrays import Array, Flags, Integers
-from nmm.progress import Progress
+from nmm.base.arrays import Array, Flags, Integers
+from nmm.base.progress import Progress
 
 #: So many of the lowest ends are followed to the bottom.
 FOLLOWED = 3

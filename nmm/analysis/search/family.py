@@ -8,8 +8,8 @@ from itertools import combinations
 
 import numpy as np
 
-from nmm.arrays import Array
-from nmm.text_format import NEAR_PI, counted, listed, signed_sum, value_text
+from nmm.base.arrays import Array
+from nmm.base.text_format import NEAR_PI, counted, listed, signed_sum, value_text
 
 #: Values of the same kind that differ by less are the same, rad or m.
 SAME_VALUE = 1e-4

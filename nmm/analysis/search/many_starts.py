@@ -14,11 +14,11 @@ from nmm.analysis.search.sorting import everywhere, families_of
 from nmm.analysis.search.space import TOLERANCE, Measure, Search, search_space
 from nmm.analysis.singular.jacobians import Jacobians, Subject
 from nmm.analysis.singular.parts import WHOLE
-from nmm.arrays import Array, counted, scalar
-from nmm.errors import SingularError
-from nmm.progress import Progress, between
-from nmm.text_format import counted as counted_text
-from nmm.text_format import listed, value_text
+from nmm.base.arrays import Array, counted, scalar
+from nmm.base.errors import SingularError
+from nmm.base.progress import Progress, between
+from nmm.base.text_format import counted as counted_text
+from nmm.base.text_format import listed, value_text
 
 #: Cheap samples for each start of the better half.
 SAMPLES = 20

@@ -14,9 +14,9 @@ from nmm.analysis.search.sorting import family_at
 from nmm.analysis.search.space import TOLERANCE, Measure, Search, search_space
 from nmm.analysis.singular.jacobians import Jacobians, Subject, checked
 from nmm.analysis.singular.parts import WHOLE
-from nmm.arrays import Array, Flags, counted
-from nmm.progress import Progress
-from nmm.text_format import listed, value_text
+from nmm.base.arrays import Array, Flags, counted
+from nmm.base.progress import Progress
+from nmm.base.text_format import listed, value_text
 
 #: Lengths of a tangent step that are tried.
 FACTORS = np.array([2.0, 1.0, 0.5, 0.1])

@@ -11,7 +11,7 @@ import numpy as np
 from nmm.analysis.search.descent import Local, localised, shaken, stay_singular, tangents, walk
 from nmm.analysis.search.family import Relation, SingularFamily, merged
 from nmm.analysis.search.space import Search
-from nmm.arrays import Array, Flags
+from nmm.base.arrays import Array, Flags
 
 #: What spreads less than this along a walk stays, in units.
 STAYS = 5e-5

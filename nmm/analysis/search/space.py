@@ -10,9 +10,9 @@ import numpy as np
 
 from nmm.analysis.singular.jacobians import STEP, Jacobians
 from nmm.analysis.singular.parts import expect_inputs, singular_values
-from nmm.arrays import Array, Flags, Integers, positive, vector
+from nmm.base.arrays import Array, Flags, Integers, positive, vector
+from nmm.base.errors import InputError, SingularError, expect
 from nmm.control.directions import direction_texts, readable_basis
-from nmm.errors import InputError, SingularError, expect
 from nmm.robots.robot import Robot
 
 TURN = 2.0 * np.pi

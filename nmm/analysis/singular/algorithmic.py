@@ -8,7 +8,7 @@ import numpy as np
 
 from nmm.analysis.singular.minors import determinants
 from nmm.analysis.singular.parts import Ranked, ranks, singular_values
-from nmm.arrays import Array, Flags, Integers
+from nmm.base.arrays import Array, Flags, Integers
 from nmm.control.directions import readable_basis
 
 

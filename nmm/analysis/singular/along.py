@@ -21,8 +21,8 @@ from nmm.analysis.singular.minors import (
 )
 from nmm.analysis.singular.parts import WHOLE, condition_numbers, groups, ranks, singular_values
 from nmm.analysis.singular.singularity import TOLERANCE
-from nmm.arrays import Array, Integers, interpolated, positive
-from nmm.errors import InputError, expect
+from nmm.base.arrays import Array, Integers, interpolated, positive
+from nmm.base.errors import InputError, expect
 from nmm.runs.trajectory import Trajectory
 
 #: Two minima count as one unless the value rises between them by this fraction of the threshold.

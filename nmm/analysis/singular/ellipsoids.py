@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.analysis.singular.parts import WHOLE, columns_of
-from nmm.arrays import Array, array, matrix, positive
-from nmm.ellipsoid_options import EllipsoidOptions, Sizes
-from nmm.errors import InputError, expect
+from nmm.base.arrays import Array, array, matrix, positive
+from nmm.base.ellipsoid_options import EllipsoidOptions, Sizes
+from nmm.base.errors import InputError, expect
 from nmm.robots.frame_path import FramePath
 from nmm.robots.reach import first_tip
 from nmm.robots.robot import Robot

@@ -8,19 +8,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.analysis.singular.parts import rank_of
-from nmm.arrays import Array, Integers, array, positive, scalar, vector
+from nmm.base.arrays import Array, Integers, array, positive, scalar, vector
+from nmm.base.cores import Work, over_cores
+from nmm.base.errors import InputError, SingularError, expect, expect_known
+from nmm.base.kernels.compiled import compiled_without_gil, kernel, view
+from nmm.base.kernels.record_layout import views
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
+from nmm.base.progress import Progress
 from nmm.control.controller import Controller
 from nmm.control.equations import ControlStep, write_equation
-from nmm.cores import Work, over_cores
-from nmm.errors import InputError, SingularError, expect, expect_known
 from nmm.functions.function import Function, Row, Stage, row_scales
 from nmm.functions.program import BESIDE, COMPILED, LaidOut, run_program
 from nmm.functions.tasks.task import Stack, Task
-from nmm.kernels.compiled import compiled_without_gil, kernel, view
-from nmm.kernels.record_layout import views
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.platforms.base import Platform
-from nmm.progress import Progress
 from nmm.resolvers.projected_gradient import ProjectedGradient
 from nmm.resolvers.reduced_gradient import Partition
 from nmm.robots.robot import Robot

@@ -9,8 +9,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from nmm.arrays import Array, Integers
-from nmm.errors import InputError, expect, expect_known
+from nmm.base.arrays import Array, Integers
+from nmm.base.errors import InputError, expect, expect_known
 
 #: A minor's columns: names of inputs, or "v, omega, q2".
 Columns: TypeAlias = str | Sequence[str]

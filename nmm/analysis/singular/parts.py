@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nmm.arrays import Array, Integers
+from nmm.base.arrays import Array, Integers
+from nmm.base.errors import InputError, expect_known
+from nmm.base.kernels.spectra import spectra
 from nmm.control.directions import direction_texts, readable_basis
-from nmm.errors import InputError, expect_known
-from nmm.kernels.spectra import spectra
 from nmm.robots.robot import Robot
 
 #: A rate this small beside the largest singular value is rounding of the differences.

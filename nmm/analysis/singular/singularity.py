@@ -34,7 +34,7 @@ from nmm.analysis.singular.parts import (
     part,
     restoration,
 )
-from nmm.arrays import Array, Integers, positive
+from nmm.base.arrays import Array, Integers, positive
 from nmm.control.directions import direction_texts
 from nmm.resolvers.partitions import candidate_columns
 from nmm.resolvers.problem import Dimensions

@@ -7,15 +7,15 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, array, scalar
-from nmm.errors import InputError, expect
+from nmm.base.arrays import Array, array, scalar
+from nmm.base.errors import InputError, expect
+from nmm.base.kernels.compiled import kernel
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.functions.function import Function, Stage, named
 from nmm.functions.objectives.base import Objective
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.linear_coordinates import Combination, coefficients
 from nmm.functions.tasks.position import Position
-from nmm.kernels.compiled import kernel
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
 #: What the rows before the kernel hold: an angle, a direction, a point.

@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, scalar
-from nmm.errors import InputError, expect, expect_kind
+from nmm.base.arrays import Array, scalar
+from nmm.base.errors import InputError, expect, expect_kind
+from nmm.base.kernels.compiled import kernel
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.functions.callbacks import of_configuration
 from nmm.functions.function import Evaluation, Function, Row, Stage, only_row, stacked
 from nmm.functions.program import evaluate
-from nmm.kernels.compiled import kernel
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 

@@ -9,15 +9,15 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
-from nmm.arrays import Array, positive, scalar
+from nmm.base.arrays import Array, positive, scalar
+from nmm.base.errors import InputError
+from nmm.base.kernels.record_layout import Memory, views
 from nmm.collisions.obstacle import Obstacle
 from nmm.collisions.rows import Rows, no_rows
 from nmm.collisions.scene import Scene, set_up
-from nmm.errors import InputError
 from nmm.functions.callbacks import stage
 from nmm.functions.function import Evaluation, Stage
 from nmm.functions.objectives.base import Objective
-from nmm.kernels.record_layout import Memory, views
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 from nmm.robots.zero_order_hold import RollingPreview

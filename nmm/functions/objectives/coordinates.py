@@ -9,15 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, positive, scalar, vector
-from nmm.errors import InputError, expect, expect_known
+from nmm.base.arrays import Array, positive, scalar, vector
+from nmm.base.errors import InputError, expect, expect_known
+from nmm.base.kernels.compiled import clear, kernel, scratch, view
+from nmm.base.kernels.linear_algebra import add, copied
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.functions.function import Function, Stage, only_row, stacked
 from nmm.functions.objectives.base import Objective
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.linear_coordinates import Combination, coefficients, label
-from nmm.kernels.compiled import clear, kernel, scratch, view
-from nmm.kernels.linear_algebra import add, copied
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
 #: How many numbers a term begins with; its n coefficients follow.

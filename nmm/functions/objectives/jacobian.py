@@ -11,14 +11,14 @@ from typing import ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from nmm.arrays import Array, positive, vector
-from nmm.errors import expect, expect_known
+from nmm.base.arrays import Array, positive, vector
+from nmm.base.errors import expect, expect_known
+from nmm.base.kernels.compiled import Kernel, clear, compiled, scratch, view
+from nmm.base.kernels.linear_algebra import add, orthonormal_rows, pseudoinverse_transposed
+from nmm.base.kernels.records import At, Frames
+from nmm.base.kernels.velocity_map import to_coordinates, to_inputs
 from nmm.functions.function import Stage, natural_size
 from nmm.functions.objectives.base import Objective
-from nmm.kernels.compiled import Kernel, clear, compiled, scratch, view
-from nmm.kernels.linear_algebra import add, orthonormal_rows, pseudoinverse_transposed
-from nmm.kernels.records import At, Frames
-from nmm.kernels.velocity_map import to_coordinates, to_inputs
 from nmm.robots.input_weights import Weights, by_name
 from nmm.robots.robot import Robot
 
@@ -30,7 +30,7 @@ LOST = 1e-12
 
 class Header(NamedTuple):
     """A stage's numbers: `platform` is p, how many of its inputs take part; `scales` D's diagonal, 1/m or 1;
-    `factors` W^-1/2's. For `moved` and `mimic_joints` see `nmm.kernels.velocity_map`."""
+    `factors` W^-1/2's. For `moved` and `mimic_joints` see `nmm.base.kernels.velocity_map`."""
 
     platform: int
     rows: Array

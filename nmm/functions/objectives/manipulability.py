@@ -7,15 +7,15 @@ from collections.abc import Sequence
 
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, nonzero_vector, positive, scalar
-from nmm.errors import expect, few
+from nmm.base.arrays import Array, nonzero_vector, positive, scalar
+from nmm.base.errors import expect, few
+from nmm.base.kernels.compiled import clear, integer_scratch, kernel, scratch
+from nmm.base.kernels.linear_algebra import add, copied
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.functions.function import Function, Stage
 from nmm.functions.objectives.base import Sum
 from nmm.functions.objectives.jacobian import JacobianObjective, Part, contract, decomposed, shape_of
 from nmm.functions.references.polynomial import Constant
-from nmm.kernels.compiled import clear, integer_scratch, kernel, scratch
-from nmm.kernels.linear_algebra import add, copied
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.input_weights import Weights
 from nmm.robots.robot import Robot
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, nonzero_vector
+from nmm.base.arrays import Array, nonzero_vector
+from nmm.base.kernels.compiled import kernel
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.functions.function import Stage
 from nmm.functions.objectives.base import Objective
 from nmm.functions.tasks.position import CenterOfMass
-from nmm.kernels.compiled import kernel
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import CENTER_OF_MASS, Robot
 
 

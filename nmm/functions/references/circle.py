@@ -7,12 +7,12 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, positive, scalar, vector
-from nmm.errors import InputError, expect
+from nmm.base.arrays import Array, positive, scalar, vector
+from nmm.base.errors import InputError, expect
+from nmm.base.kernels.compiled import kernel
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.functions.function import Function, Row, Shown, Stage, named
 from nmm.functions.references.polynomial import PiecewisePolynomial, piecewise_polynomial
-from nmm.kernels.compiled import kernel
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
 

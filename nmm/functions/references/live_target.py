@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, array, scalar, vector
+from nmm.base.arrays import Array, array, scalar, vector
+from nmm.base.kernels.compiled import compiled, kernel
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.functions.function import Function, LiveNumbers, Row, Stage
-from nmm.kernels.compiled import compiled, kernel
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
 

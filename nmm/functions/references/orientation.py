@@ -7,13 +7,20 @@ from abc import abstractmethod
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, matrix, nonzero_vector, positive, scalar, vector
-from nmm.errors import expect
+from nmm.base.arrays import Array, matrix, nonzero_vector, positive, scalar, vector
+from nmm.base.errors import expect
+from nmm.base.kernels.compiled import kernel, scratch
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
+from nmm.base.kernels.rotations import (
+    between3,
+    compose3,
+    exp3,
+    left_jacobian_inverse3,
+    log3,
+    transposed_times3,
+)
 from nmm.functions.function import Function, Row, Stage, named, stacked
 from nmm.functions.references.polynomial import Constant, Profile, share_of_way
-from nmm.kernels.compiled import kernel, scratch
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
-from nmm.kernels.rotations import between3, compose3, exp3, left_jacobian_inverse3, log3, transposed_times3
 from nmm.robots.robot import Robot
 
 #: How far RᵀR may be from the identity, and a quaternion from length 1.

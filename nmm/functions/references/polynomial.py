@@ -8,11 +8,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, array, increasing, positive, vector
-from nmm.errors import expect, expect_known
+from nmm.base.arrays import Array, array, increasing, positive, vector
+from nmm.base.errors import expect, expect_known
+from nmm.base.kernels.compiled import kernel
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.functions.function import Function, Row, Stage
-from nmm.kernels.compiled import kernel
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import counted, positive, scalar, vector
-from nmm.errors import expect
+from nmm.base.arrays import counted, positive, scalar, vector
+from nmm.base.errors import expect
 
 
 @dataclass(frozen=True)

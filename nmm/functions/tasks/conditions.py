@@ -9,8 +9,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import infinite, positive, scalar
-from nmm.errors import InputError, expect, expect_kind
+from nmm.base.arrays import infinite, positive, scalar
+from nmm.base.errors import InputError, expect, expect_kind
 from nmm.functions.function import Function
 
 

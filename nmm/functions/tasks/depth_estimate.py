@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 
 #: Of a depth that is guessed: its standard deviation over it.
 UNSURE = 0.5

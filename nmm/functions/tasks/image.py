@@ -10,8 +10,8 @@ from typing import Self, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, vector
-from nmm.errors import InputError, expect, few
+from nmm.base.arrays import Array, vector
+from nmm.base.errors import InputError, expect, few
 from nmm.functions.function import Function, Row, Shown, Sight, Stage, stacked
 from nmm.functions.program import evaluate
 from nmm.functions.tasks.image_kernels import image_line, image_moments, image_points, log_depth

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from nmm.arrays import Array
-from nmm.kernels.compiled import compiled, kernel, scratch
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
-from nmm.kernels.rotations import transposed_times3
+from nmm.base.arrays import Array
+from nmm.base.kernels.compiled import compiled, kernel, scratch
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
+from nmm.base.kernels.rotations import transposed_times3
 
 
 @compiled

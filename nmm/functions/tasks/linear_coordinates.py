@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from nmm.arrays import Array, scalar
-from nmm.errors import expect, expect_kind
+from nmm.base.arrays import Array, scalar
+from nmm.base.errors import expect, expect_kind
+from nmm.base.kernels.compiled import kernel
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
+from nmm.base.text_format import signed_sum
 from nmm.functions.function import Function, Row, Stage
-from nmm.kernels.compiled import kernel
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
-from nmm.text_format import signed_sum
 
 #: A coordinate's name, or the coefficients of several.
 Combination = str | Mapping[str, float]

@@ -10,18 +10,18 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, array, counted, scalar, vector
-from nmm.errors import InputError, expect
-from nmm.findings import Finding
+from nmm.base.arrays import Array, array, counted, scalar, vector
+from nmm.base.errors import InputError, expect
+from nmm.base.findings import Finding
+from nmm.base.kernels.compiled import kernel
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
+from nmm.base.kernels.rotations import exp3
 from nmm.functions.function import Function, LiveNumbers, Renewal, Row, Stage, move_rows
 from nmm.functions.program import Program
 from nmm.functions.references.live_target import signal
 from nmm.functions.tasks.camera_faults import CameraFaults
 from nmm.functions.tasks.depth_estimate import ALMOST_SURE, DepthEstimate, MotionEstimate
 from nmm.functions.tasks.image import Points, Seen
-from nmm.kernels.compiled import kernel
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
-from nmm.kernels.rotations import exp3
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 

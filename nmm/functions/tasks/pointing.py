@@ -7,14 +7,14 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, nonzero_vector
-from nmm.errors import expect_known
+from nmm.base.arrays import Array, nonzero_vector
+from nmm.base.errors import expect_known
+from nmm.base.kernels.compiled import kernel, scratch
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
+from nmm.base.kernels.rotations import transposed_times3
 from nmm.functions.function import Function, Row, Shown, Stage
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.position import as_point, check_point
-from nmm.kernels.compiled import kernel, scratch
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
-from nmm.kernels.rotations import transposed_times3
 from nmm.robots.robot import Robot
 
 UNIT = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}

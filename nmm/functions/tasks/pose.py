@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from nmm.arrays import Array
-from nmm.errors import expect
-from nmm.functions.function import Function, Row, Shown, Stage
-from nmm.kernels.compiled import compiled, kernel, scratch
-from nmm.kernels.linear_algebra import copied
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
-from nmm.kernels.rotations import (
+from nmm.base.arrays import Array
+from nmm.base.errors import expect
+from nmm.base.kernels.compiled import compiled, kernel, scratch
+from nmm.base.kernels.linear_algebra import copied
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
+from nmm.base.kernels.rotations import (
     between3,
     cross3,
     exp3,
@@ -22,6 +21,7 @@ from nmm.kernels.rotations import (
     times3,
     transposed_times3,
 )
+from nmm.functions.function import Function, Row, Shown, Stage
 from nmm.robots.robot import Robot
 
 #: Rows of a pose and their units: position over rotation vector.

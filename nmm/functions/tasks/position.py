@@ -8,14 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, vector
-from nmm.errors import InputError, expect
+from nmm.base.arrays import Array, vector
+from nmm.base.errors import InputError, expect
+from nmm.base.kernels.compiled import kernel, scratch
+from nmm.base.kernels.linear_algebra import copied
+from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.functions.function import Function, Row, Stage, named
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.pose import PartsOfPose, frame_pose
-from nmm.kernels.compiled import kernel, scratch
-from nmm.kernels.linear_algebra import copied
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import CENTER_OF_MASS, Robot
 
 AXES = {"x": 0, "y": 1, "z": 2}

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, array, counted
-from nmm.errors import InputError, expect, expect_kind, expect_known, one_or_several
+from nmm.base.arrays import Array, array, counted
+from nmm.base.errors import InputError, expect, expect_kind, expect_known, one_or_several
 from nmm.functions.function import Function, Row, Stage
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.conditions import After, Between, Condition, While, by_unit

@@ -9,8 +9,8 @@ import cmath
 import math
 from dataclasses import dataclass
 
-from nmm.arrays import positive, scalar
-from nmm.errors import InputError, expect
+from nmm.base.arrays import positive, scalar
+from nmm.base.errors import InputError, expect
 from nmm.platforms.wheel_layout import HITCHES, Layout, Pivot, RollingJoint, trails
 
 #: Name of the main body: of the coordinate that turns it.

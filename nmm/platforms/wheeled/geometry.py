@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nmm.arrays import Array
-from nmm.errors import InputError, expect_known
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError, expect_known
 from nmm.platforms.wheeled.descriptions import (
     MAIN,
     CasterWheel,

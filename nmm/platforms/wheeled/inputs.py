@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from nmm.arrays import scalar
-from nmm.errors import InputError, expect, expect_known
+from nmm.base.arrays import scalar
+from nmm.base.errors import InputError, expect, expect_known
 from nmm.platforms.wheeled.descriptions import MAIN, FixedWheel, SteeredWheel, WheelDescription
 from nmm.platforms.wheeled.geometry import (
     Axis,

@@ -23,10 +23,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nmm.arrays import Array
-from nmm.kernels.compiled import PLATFORM, clear, compiled, inlined, integer_scratch, kernel, scratch, view
-from nmm.kernels.linear_algebra import dot, eliminate
-from nmm.kernels.rotations import cross3
+from nmm.base.arrays import Array
+from nmm.base.kernels.compiled import (
+    PLATFORM,
+    clear,
+    compiled,
+    inlined,
+    integer_scratch,
+    kernel,
+    scratch,
+    view,
+)
+from nmm.base.kernels.linear_algebra import dot, eliminate
+from nmm.base.kernels.rotations import cross3
 
 BODIES, TERMS, RATES, CLOSURES, COMMON, SIZE = range(6)
 _AXIS = 4

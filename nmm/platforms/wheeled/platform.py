@@ -10,8 +10,8 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, scalar, vector
-from nmm.errors import InputError, expect, expect_known
+from nmm.base.arrays import Array, scalar, vector
+from nmm.base.errors import InputError, expect, expect_known
 from nmm.platforms.base import Platform
 from nmm.platforms.steering import SteeredAxle, SteeringPivot
 from nmm.platforms.wheel_layout import Layout

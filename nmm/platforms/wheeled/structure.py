@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nmm.arrays import Array
-from nmm.errors import InputError
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError
+from nmm.base.text_format import apart, listed
 from nmm.platforms.wheeled.descriptions import MAIN, FixedWheel, SteeredWheel, WheelDescription
 from nmm.platforms.wheeled.geometry import Bodies, Closure, Rate, Row, Velocity, axis_of
 from nmm.platforms.wheeled.inputs import Input, Named, read
 from nmm.platforms.wheeled.kernel import CONTRADICTION
-from nmm.text_format import apart, listed
 
 #: Rows are dependent when a unit combination of them is smaller: files give angles and lengths rounded.
 DEPENDENT = 1e-4

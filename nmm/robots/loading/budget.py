@@ -13,8 +13,8 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-from nmm.files import read_bytes
-from nmm.findings import Finding
+from nmm.base.files import read_bytes
+from nmm.base.findings import Finding
 
 #: Steps of xacro (an element, a piece of text, a call in an expression, an item of its loops), what a file
 #: counts, and how many seconds of processor they may take.

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from nmm.errors import RobotError, few
-from nmm.findings import Finding
+from nmm.base.errors import RobotError, few
+from nmm.base.findings import Finding
 from nmm.platforms.base import PLANAR as CHAIN
 from nmm.robots.loading.joint_kinds import (
     is_continuous,

@@ -9,7 +9,7 @@ from collections.abc import Collection, Container, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from nmm.findings import Finding
+from nmm.base.findings import Finding
 from nmm.platforms import PLATFORMS
 from nmm.robots.loading.budget import MOST_IN_A_ROW, MOST_LINKS, MOST_MOVING
 from nmm.robots.loading.check_limits import (

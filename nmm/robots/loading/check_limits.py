@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 from math import inf
 
-from nmm.findings import Finding
+from nmm.base.findings import Finding
 from nmm.robots.coordinates import UNLIMITED
 from nmm.robots.loading.xml_tree import Attributes, Element, Owner, child
 

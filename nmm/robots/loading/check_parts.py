@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nmm.findings import Finding
+from nmm.base.findings import Finding
 from nmm.robots.loading.check_limits import check_limit
 from nmm.robots.loading.xml_tree import NOBODY, Attributes, Element, Owner, child, children, link_at
 

@@ -16,14 +16,14 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from nmm.errors import RobotError, expect_known
-from nmm.findings import Finding
-from nmm.findings.robot_file import refusal
+from nmm.base.errors import RobotError, expect_known
+from nmm.base.findings import Finding
+from nmm.base.findings.robot_file import refusal
+from nmm.base.text_format import listed, one_line
 from nmm.robots.loading.budget import STEPS_OF_A_FILE, BeyondBound, Budget, counted_xacro
 from nmm.robots.loading.mjcf import Converted, urdf_of
 from nmm.robots.loading.packages import Packages
 from nmm.robots.loading.xml_tree import Element, XmlError, parse, read_text
-from nmm.text_format import listed, one_line
 
 SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf")
 #: Robots in other languages, by their files' suffixes.

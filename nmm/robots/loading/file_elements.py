@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from nmm.findings import Finding
+from nmm.base.findings import Finding
 from nmm.robots.loading.xml_tree import Element, children
 
 #: How much alike a name is that was probably meant, of 1.

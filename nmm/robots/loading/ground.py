@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
-from nmm.findings import Finding
+from nmm.base.arrays import Array
+from nmm.base.findings import Finding
 from nmm.platforms.wheel_layout import HITCHES, PARALLEL
 from nmm.robots.loading.extents import has_width
 from nmm.robots.loading.measured_joints import ROUNDED, Measured

@@ -10,7 +10,7 @@ from typing import Literal
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from nmm.errors import RobotError, expect_kind, one_or_several
+from nmm.base.errors import RobotError, expect_kind, one_or_several
 from nmm.platforms import Platform, platform_by_name
 from nmm.robots.loading.models import robot_from
 from nmm.robots.loading.packages import PACKAGE, package_file

@@ -7,14 +7,14 @@ from itertools import combinations
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array, scalar
-from nmm.errors import InputError, RobotError, expect_known
-from nmm.findings import Finding
+from nmm.base.arrays import Array, scalar
+from nmm.base.errors import InputError, RobotError, expect_known
+from nmm.base.findings import Finding
+from nmm.base.text_format import apart, is_pattern, matching
 from nmm.robots.loading.chain import CHAIN, Rebuilt
 from nmm.robots.loading.joint_kinds import is_revolute
 from nmm.robots.mimic_joints import MimicJoint, first_leaders, settled
 from nmm.robots.robot import Robot
-from nmm.text_format import apart, is_pattern, matching
 
 # Limits are decimal fractions of angles that are none.
 _SLACK = 1e-9

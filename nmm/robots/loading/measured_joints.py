@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array, positive
-from nmm.errors import InputError, RobotError, expect_known
-from nmm.findings import Finding
-from nmm.findings.robot_file import refusal
+from nmm.base.arrays import Array, positive
+from nmm.base.errors import InputError, RobotError, expect_known
+from nmm.base.findings import Finding
+from nmm.base.findings.robot_file import refusal
 from nmm.platforms.wheel_layout import (
     PARALLEL,
     Rollers,

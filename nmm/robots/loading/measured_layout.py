@@ -5,8 +5,8 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from nmm.arrays import Array
-from nmm.errors import RobotError, expect_known
+from nmm.base.arrays import Array
+from nmm.base.errors import RobotError, expect_known
 from nmm.platforms.recognition import with_roles
 from nmm.platforms.wheel_layout import HITCHES, STEERING, SWIVELS, Layout, Pivot, RollingJoint, is_named
 from nmm.robots.loading.measured_joints import Asked, Measured, NoWheel, ends_of, speed_limit

@@ -8,9 +8,9 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
-from nmm.findings import Finding
-from nmm.findings.robot_file import refusal
+from nmm.base.arrays import Array
+from nmm.base.findings import Finding
+from nmm.base.findings.robot_file import refusal
 from nmm.robots.loading.check import RESERVED
 from nmm.robots.loading.check_parts import MESH_SUFFIXES, MOMENTS
 from nmm.robots.loading.mending import NO_LIMIT

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import cast
 from xml.etree import ElementTree
 
-from nmm.findings import Finding
-from nmm.findings.robot_file import refusal
+from nmm.base.findings import Finding
+from nmm.base.findings.robot_file import refusal
 from nmm.robots.loading.xml_tree import DEEPEST, Element, XmlError, parse, read_text
 
 

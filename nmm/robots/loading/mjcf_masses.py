@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.robots.loading.mjcf_numbers import Numbers
 from nmm.robots.loading.mjcf_reading import Dropped, Mjcf
 from nmm.robots.loading.mjcf_tree import Body, Geom, Inertial, Mesh

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.robots.loading.xml_tree import Attributes, Element
 
 ORIGIN = (0.0, 0.0, 0.0)

@@ -6,7 +6,7 @@ or refuses the file by name. *Without effect* is what says nothing of motion, sh
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Literal, NamedTuple, cast
 
-from nmm.findings import Finding
+from nmm.base.findings import Finding
 from nmm.robots.loading.xml_tree import Element
 
 How = Literal["read", "noted", "without effect"]

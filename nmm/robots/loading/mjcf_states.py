@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from nmm.findings import Finding
+from nmm.base.findings import Finding
 from nmm.robots.loading.mjcf_reading import Mjcf
 from nmm.robots.loading.mjcf_tree import Joint
 from nmm.robots.loading.srdf_parts import Srdf

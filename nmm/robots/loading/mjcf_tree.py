@@ -7,7 +7,7 @@ from typing import TypeVar
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.robots.loading.xml_tree import Element
 
 #: A new name by "body", "joint", "site" or "geom", and the name.

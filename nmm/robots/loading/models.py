@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from nmm.errors import InputError, RobotError, expect_known
-from nmm.findings import Finding
+from nmm.base.errors import InputError, RobotError, expect_known
+from nmm.base.findings import Finding
 from nmm.platforms import AddedJoint, FixedBase, Layout, Platform
 from nmm.platforms.recognition import AT_ROOT
 from nmm.platforms.wheel_layout import MAIN_BODY, standing_wheels, wheels_on

@@ -12,9 +12,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from nmm.arrays import array, vector
-from nmm.errors import InputError, RobotError, expect_known, few
-from nmm.findings import Finding
+from nmm.base.arrays import array, vector
+from nmm.base.errors import InputError, RobotError, expect_known, few
+from nmm.base.findings import Finding
 from nmm.platforms import FixedBase
 from nmm.robots.loading.chain import CHAIN, rebuild
 from nmm.robots.loading.load import load

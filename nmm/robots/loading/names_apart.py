@@ -6,7 +6,7 @@ from typing import Any
 
 import pinocchio as pin
 
-from nmm.findings import Finding
+from nmm.base.findings import Finding
 from nmm.robots.loading.chain import CHAIN
 from nmm.robots.loading.check import RESERVED
 from nmm.robots.loading.locking import Locked

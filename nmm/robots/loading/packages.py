@@ -11,10 +11,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from urllib.parse import unquote
 
-from nmm.errors import RobotError
-from nmm.files import named_folder
-from nmm.findings import Finding
-from nmm.findings.robot_file import refusal
+from nmm.base.errors import RobotError
+from nmm.base.files import named_folder
+from nmm.base.findings import Finding
+from nmm.base.findings.robot_file import refusal
 from nmm.robots.loading.xml_tree import read_text
 
 PACKAGE = "package://"

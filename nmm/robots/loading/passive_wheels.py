@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from nmm.findings import Finding
+from nmm.base.findings import Finding
 from nmm.platforms import Platform
 from nmm.platforms.wheel_layout import NEAR, Layout
 from nmm.robots.loading.measured_joints import ROUNDED, Asked, Measured, speed_limit

@@ -14,8 +14,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, array
-from nmm.errors import InputError, expect_known, few, no_such
+from nmm.base.arrays import Array, array
+from nmm.base.errors import InputError, expect_known, few, no_such
 from nmm.robots.joint_table import twist
 from nmm.robots.loading.chain import CHAIN, CHAIN_JOINTS, Head, rebuild, replaced_joints
 from nmm.robots.loading.joint_kinds import is_continuous, is_mimic, is_simple, kind

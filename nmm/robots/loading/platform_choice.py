@@ -7,9 +7,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from nmm.arrays import array
-from nmm.errors import InputError, RobotError, expect_known
-from nmm.findings import Finding
+from nmm.base.arrays import array
+from nmm.base.errors import InputError, RobotError, expect_known
+from nmm.base.findings import Finding
 from nmm.platforms import FixedBase, Layout, Platform, platform_by_name
 from nmm.platforms.recognition import AT_ROOT, Pose, recognized, reference_of
 from nmm.robots.loading.chain import CHAIN

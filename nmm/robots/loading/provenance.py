@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from nmm.errors import RobotError
-from nmm.findings import Finding
+from nmm.base.errors import RobotError
+from nmm.base.findings import Finding
 from nmm.robots.loading.locking import at_zero
 from nmm.robots.robot import Robot
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from nmm.errors import InputError, RobotError, expect_known, few
-from nmm.findings import Finding
-from nmm.findings.robot_file import line_of
+from nmm.base.errors import InputError, RobotError, expect_known, few
+from nmm.base.findings import Finding
+from nmm.base.findings.robot_file import line_of
+from nmm.base.text_format import counted, one_line
 from nmm.robots.loading.check import inspect
 from nmm.robots.loading.check_parts import advice
 from nmm.robots.loading.description import Description, argument_texts, describe, expand
@@ -22,7 +23,6 @@ from nmm.robots.loading.provenance import acceleration_notes, provenance_of
 from nmm.robots.loading.xml_tree import Element, children, link_at
 from nmm.robots.meshes import read_meshes
 from nmm.robots.robot import Robot
-from nmm.text_format import counted, one_line
 
 _NOWHERE = "/(package not found)"
 

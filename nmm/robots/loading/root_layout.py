@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from nmm.arrays import Array
-from nmm.errors import InputError
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError
 
 # How far a root may be from upright or its height, or a pair from unit length: numbers have a few digits.
 _LEVEL = 1e-6

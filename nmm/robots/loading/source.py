@@ -13,10 +13,11 @@ from xml.etree import ElementTree
 
 import pinocchio as pin
 
-from nmm.bundled import bundled_robots
-from nmm.errors import RobotError, expect_known, no_such
-from nmm.findings import Finding
-from nmm.findings.robot_file import refusal
+from nmm.base.bundled import bundled_robots
+from nmm.base.errors import RobotError, expect_known, no_such
+from nmm.base.findings import Finding
+from nmm.base.findings.robot_file import refusal
+from nmm.base.text_format import one_line
 from nmm.robots.loading import mending
 from nmm.robots.loading.chain import CHAIN, mimic_joints_of, replaced_joints
 from nmm.robots.loading.check import CheckedUrdf, inspect
@@ -30,7 +31,6 @@ from nmm.robots.loading.provenance import Provenance
 from nmm.robots.loading.xml_tree import Element, child, children
 from nmm.robots.meshes import leave_unread
 from nmm.robots.mimic_joints import MimicJoint
-from nmm.text_format import one_line
 
 # What Pinocchio gets of a checked description: kinematics, inertia and shapes. The rest (calibration,
 # safety_controller, mimic of locked joints, transmissions, Gazebo's elements) says nothing to nmm, and

@@ -8,9 +8,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from nmm.errors import RobotError
-from nmm.findings import Finding
-from nmm.findings.robot_file import refusal
+from nmm.base.errors import RobotError
+from nmm.base.findings import Finding
+from nmm.base.findings.robot_file import refusal
 from nmm.robots.loading.description import argument_texts, expand
 from nmm.robots.loading.file_elements import SRDF, unread
 from nmm.robots.loading.packages import Packages

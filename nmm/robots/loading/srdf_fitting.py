@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from nmm.errors import RobotError, expect_known
-from nmm.findings import Finding
+from nmm.base.errors import RobotError, expect_known
+from nmm.base.findings import Finding
 from nmm.robots.loading.provenance import provenance_of
 from nmm.robots.loading.srdf import read_srdf, srdf_beside
 from nmm.robots.loading.srdf_parts import Group, Srdf

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from nmm.findings import Finding
+from nmm.base.findings import Finding
 
 
 class Group(NamedTuple):

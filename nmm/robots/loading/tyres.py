@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
+from nmm.base.arrays import Array
 from nmm.robots.loading.extents import points_of, width
 from nmm.robots.mesh_files import mesh_arrays
 from nmm.robots.meshes import is_unread

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
-from nmm.findings import Finding
+from nmm.base.arrays import Array
+from nmm.base.findings import Finding
 from nmm.platforms import Omnidirectional, Platform
 from nmm.platforms.wheel_layout import NEAR
 from nmm.robots.coordinates import UNLIMITED

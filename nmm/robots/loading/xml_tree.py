@@ -10,9 +10,9 @@ from typing import Any, cast
 from xml.etree import ElementTree
 from xml.parsers import expat
 
-from nmm.files import read_bytes
-from nmm.findings import Finding
-from nmm.findings.robot_file import refusal
+from nmm.base.files import read_bytes
+from nmm.base.findings import Finding
+from nmm.base.findings.robot_file import refusal
 from nmm.robots.loading.budget import MOST_ELEMENTS
 
 #: How deep elements may stand in one another: what reads them further recurses.

@@ -1,5 +1,0 @@
-"""Findings as data, and the sentence of each code, which only `str(finding)` makes."""
-
-from nmm.findings.finding import Finding, words
-
-__all__ = ["Finding", "words"]
