@@ -16,8 +16,8 @@ from collections.abc import Callable
 from typing import TypeVar
 
 import nmm
-from nmm.robots.meshes import is_unread
-from nmm.robots.reach import first_tip
+from nmm.model.robots.meshes import is_unread
+from nmm.model.robots.reach import first_tip
 
 PUBLIC = "package://example-robot-data/robots"
 ROBOTS = {

@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from nmm.robots.loading.file_elements import READ, SRDF, URDF, How, Part, Table
-from nmm.robots.loading.mjcf_parts import ELEMENTS, EVERYWHERE
+from nmm.model.robots.loading.file_elements import READ, SRDF, URDF, How, Part, Table
+from nmm.model.robots.loading.mjcf_parts import ELEMENTS, EVERYWHERE
 
 PAGE = Path(__file__).with_name("file_elements.md")
 #: By the format's name, as the page has them.

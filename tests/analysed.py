@@ -7,8 +7,8 @@ import twin
 from nmm.control.controller import Controller
 from nmm.functions.references import Bearing
 from nmm.functions.tasks import Heading, LinearCoordinates, Position, Task
+from nmm.model.robots.robot import Robot
 from nmm.resolvers import ExtendedJacobian
-from nmm.robots.robot import Robot
 
 TIP = Task(Position("ee", "xy"), [0.0, 0.0])
 TIP_3D = Task(Position("ee", "xyz"), [0.0, 0.0, 0.0])

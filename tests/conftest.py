@@ -15,8 +15,8 @@ from gripping import folding
 from site_pages import built
 from spatial_arms import load_tiago, load_ur5
 
-from nmm.robots.loading import description, load
-from nmm.robots.robot import Robot
+from nmm.model.robots.loading import description, load
+from nmm.model.robots.robot import Robot
 
 
 def pytest_configure() -> None:

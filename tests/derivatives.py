@@ -12,8 +12,8 @@ from nmm.control.controller import Controller
 from nmm.functions.function import Function
 from nmm.functions.objectives import Objective
 from nmm.functions.program import Program
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

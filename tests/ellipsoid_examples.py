@@ -8,8 +8,8 @@ import numpy as np
 
 import nmm
 from nmm.base.arrays import Array
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 
 
 @cache

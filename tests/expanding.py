@@ -7,8 +7,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from nmm.base.bundled import bundled_robots
-from nmm.robots.loading.description import expand
-from nmm.robots.loading.packages import Packages
+from nmm.model.robots.loading.description import expand
+from nmm.model.robots.loading.packages import Packages
 
 Expanded = tuple[str, dict[str, str], tuple[str, ...]]
 

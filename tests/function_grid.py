@@ -70,8 +70,8 @@ from nmm.functions.tasks import (
     Position,
     Posture,
 )
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

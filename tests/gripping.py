@@ -6,8 +6,8 @@ from dataclasses import replace
 from functools import cache
 
 import nmm
-from nmm.robots.mimic_joints import MimicJoint
-from nmm.robots.robot import Robot
+from nmm.model.robots.mimic_joints import MimicJoint
+from nmm.model.robots.robot import Robot
 
 DATA = "package://example-robot-data/robots/"
 PANDA = DATA + "panda_description/urdf/panda.urdf"

@@ -204,7 +204,7 @@ def _serve() -> None:
         importlib.import_module(name)
     # Drawing is most of a command's time, and writes no other files than this.
     importlib.import_module("matplotlib.figure").Figure.savefig = _picture
-    importlib.import_module("nmm.robots.loading.description").expand = expanded_once
+    importlib.import_module("nmm.model.robots.loading.description").expand = expanded_once
     practised: list[list[str]] = []
     for line in sys.stdin:
         request = Request(**json.loads(line))

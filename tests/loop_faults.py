@@ -17,7 +17,7 @@ from wandering import beyond
 
 import nmm
 from nmm.base.text_format import listed
-from nmm.robots.zero_order_hold import HeldInputs
+from nmm.model.robots.zero_order_hold import HeldInputs
 
 PERIOD = 0.01
 #: When the fault begins, s: the robot moves.

@@ -15,8 +15,8 @@ from nmm.control.controller import Controller
 from nmm.functions.objectives import Objective, Quadratic, QuadraticTerm
 from nmm.functions.references import Bearing, Circle
 from nmm.functions.tasks import Heading, Position, Task
+from nmm.model.robots.robot import Robot
 from nmm.resolvers import ProjectedGradient, ReducedGradient, Resolver
-from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import nmm
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 LIMITS = '<limit effort="9" velocity="9" lower="-7" upper="7"/>'
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from wheeled_examples import EXAMPLES as WHEELED
 
-from nmm.platforms import (
+from nmm.model.platforms import (
     Car,
     DifferentialDrive,
     FixedBase,

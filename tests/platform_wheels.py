@@ -13,9 +13,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from nmm.platforms import Mecanum, Platform, SkidSteer, Tractor
-from nmm.platforms.car import Car, FrontDriveCar
-from nmm.platforms.unicycle import DifferentialDrive
+from nmm.model.platforms import Mecanum, Platform, SkidSteer, Tractor
+from nmm.model.platforms.car import Car, FrontDriveCar
+from nmm.model.platforms.unicycle import DifferentialDrive
 
 Array = NDArray[np.float64]
 

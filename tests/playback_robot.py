@@ -9,10 +9,10 @@ import numpy as np
 import pinocchio as pin
 import trimesh
 
-from nmm.platforms import Unicycle
+from nmm.model.platforms import Unicycle
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.wheel import Wheel
 from nmm.playback import Motion
-from nmm.robots.robot import Robot
-from nmm.robots.wheel import Wheel
 
 fcl = pin.hppfcl
 

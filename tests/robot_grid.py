@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cache
 
 import nmm
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 DATA = "package://example-robot-data/robots/"
 

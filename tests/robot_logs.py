@@ -13,7 +13,7 @@ from rosbags import rosbag1, rosbag2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import nmm
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 STORE, FIRST = get_typestore(Stores.ROS2_HUMBLE), get_typestore(Stores.ROS1_NOETIC)
 for _name in ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"):

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 import nmm
 from nmm.functions.references import Circle
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading.packages import Packages
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading.packages import Packages
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

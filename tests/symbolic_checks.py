@@ -17,9 +17,9 @@ from nmm.analysis.singular.jacobians import Jacobians, stacked
 from nmm.functions.program import evaluate
 from nmm.functions.references import Bearing
 from nmm.functions.tasks import Heading, Position, Task
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading import load
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading import load
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

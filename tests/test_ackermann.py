@@ -14,10 +14,10 @@ from urdf_parts import write
 
 import nmm
 from nmm.cli.exit_status import status_of
-from nmm.platforms import Car, FrontDriveCar
+from nmm.model.platforms import Car, FrontDriveCar
+from nmm.model.robots.robot import Robot
 from nmm.playback.placements import Placements
 from nmm.playback.rolling import Rolling
-from nmm.robots.robot import Robot
 
 Array = np.ndarray
 

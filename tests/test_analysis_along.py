@@ -13,9 +13,9 @@ from nmm.analysis import analyse, analyse_along
 from nmm.base.errors import InputError
 from nmm.control.controller import Controller
 from nmm.functions.tasks import Position
+from nmm.model.robots.loading import load
+from nmm.model.robots.robot import Robot
 from nmm.resolvers import ProjectedGradient
-from nmm.robots.loading import load
-from nmm.robots.robot import Robot
 from nmm.runs.simulation import simulate
 
 Array = NDArray[np.float64]

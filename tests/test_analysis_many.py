@@ -17,8 +17,8 @@ from nmm.analysis.singular.jacobians import Jacobians
 from nmm.base import cores
 from nmm.base.kernels.spectra import FEW_ROWS, SIDE_BY_SIDE, spectra, write_spectrum
 from nmm.functions.tasks import CallableFunction, Pose, Position
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

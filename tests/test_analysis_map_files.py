@@ -17,9 +17,9 @@ from nmm.base.errors import InputError
 from nmm.figures.maps import thinned
 from nmm.folders.map import is_map
 from nmm.functions.tasks import Heading, Position
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading import load
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading import load
+from nmm.model.robots.robot import Robot
 
 PLANAR = Position("ee", "xy")
 WITH_HEADING = (PLANAR, Heading("link2"))

@@ -16,9 +16,9 @@ from nmm.analysis.maps.coordinates import singularity_map
 from nmm.analysis.maps.measures import MEASURES, spectra_of
 from nmm.analysis.maps.singular_set import SingularSet
 from nmm.functions.tasks import Heading, Pose, Position
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading import load
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading import load
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 PLANAR = Position("ee", "xy")

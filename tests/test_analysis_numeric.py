@@ -18,9 +18,9 @@ from nmm.base.errors import InputError, SingularError
 from nmm.control.controller import Controller
 from nmm.control.directions import direction_text, readable_basis
 from nmm.functions.tasks import LinearCoordinates, Pose, Position, Task
+from nmm.model.robots.loading import load, mount
+from nmm.model.robots.robot import Robot
 from nmm.resolvers import ReducedGradient
-from nmm.robots.loading import load, mount
-from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -17,10 +17,10 @@ from nmm.control.controller import Controller
 from nmm.functions.function import Function
 from nmm.functions.references import Bearing
 from nmm.functions.tasks import Heading, Pose, Position, Task
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading import load, mount
+from nmm.model.robots.robot import Robot
 from nmm.resolvers import ProjectedGradient
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading import load, mount
-from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -19,8 +19,8 @@ from nmm.analysis.search.many_starts import SingularitySearch, find_singularitie
 from nmm.analysis.search.nearest import nearest_singularity
 from nmm.base.errors import InputError, SingularError
 from nmm.functions.tasks import CallableFunction, Heading, Pose, Position, Posture
-from nmm.robots.loading import load
-from nmm.robots.robot import Robot
+from nmm.model.robots.loading import load
+from nmm.model.robots.robot import Robot
 from nmm.scenario import Scenario
 
 Array = NDArray[np.float64]

@@ -17,8 +17,8 @@ from nmm.base.text_format import value_text
 from nmm.cli.singularity_options import search_command, show_nearest, show_search
 from nmm.cli.subjects import studied
 from nmm.functions.tasks import CallableFunction, Position
-from nmm.robots.loading import load
-from nmm.robots.robot import Robot
+from nmm.model.robots.loading import load
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ from nmm.analysis.search.family import SingularFamily
 from nmm.analysis.search.many_starts import SingularitySearch, find_singularities
 from nmm.analysis.search.nearest import nearest_singularity
 from nmm.functions.tasks import Pose
-from nmm.robots.loading import load
-from nmm.robots.robot import Robot
+from nmm.model.robots.loading import load
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

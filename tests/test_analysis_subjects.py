@@ -13,9 +13,9 @@ from nmm.analysis.singular.jacobians import Jacobians
 from nmm.base.errors import InputError
 from nmm.functions.program import evaluate
 from nmm.functions.tasks import Heading, Orientation, Pose, Position, Task
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading import load
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading import load
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ from nmm.analysis.formulas.expressions import shown
 from nmm.analysis.formulas.symbolic_analysis import latex_lines
 from nmm.base.errors import InputError
 from nmm.functions.tasks import Distance, Orientation, Pointing, Position
-from nmm.platforms import DifferentialDrive
-from nmm.robots.loading import load
+from nmm.model.platforms import DifferentialDrive
+from nmm.model.robots.loading import load
 
 ARGUMENTS = [None, {"d": -0.2, "h": 0.4, "l1": 0.35, "l2": 0.35}, {"d": 0}]
 

@@ -18,9 +18,9 @@ from nmm.analysis.maps.workspace import in_curves, workspace_map
 from nmm.analysis.singular.jacobians import Jacobians
 from nmm.base.errors import InputError
 from nmm.functions.tasks import Position
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading import load
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading import load
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 PLANAR = Position("ee", "xy")

@@ -17,11 +17,11 @@ from nmm import Finding
 from nmm.base.bundled import bundled_robots
 from nmm.base.errors import RobotError
 from nmm.base.text_format import printable, short_words
-from nmm.robots.loading import load
-from nmm.robots.loading.check import inspect
-from nmm.robots.loading.check_parts import MESH_SUFFIXES, FindMesh
-from nmm.robots.loading.report import file_report
-from nmm.robots.robot import Robot
+from nmm.model.robots.loading import load
+from nmm.model.robots.loading.check import inspect
+from nmm.model.robots.loading.check_parts import MESH_SUFFIXES, FindMesh
+from nmm.model.robots.loading.report import file_report
+from nmm.model.robots.robot import Robot
 
 pytestmark = pytest.mark.usefixtures("xacro_each_time")
 
@@ -790,7 +790,7 @@ def test_unreadable(suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     def read_bytes(file: Path, most: int) -> bytes:
         raise PermissionError(13, "Permission denied", str(file))
 
-    monkeypatch.setattr("nmm.robots.loading.xml_tree.read_bytes", read_bytes)
+    monkeypatch.setattr("nmm.model.robots.loading.xml_tree.read_bytes", read_bytes)
     assert_found(refused(path).findings, ("file_unreadable", {"reason": "Permission denied"}))
 
 

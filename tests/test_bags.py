@@ -18,7 +18,7 @@ import nmm
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError
 from nmm.cli.exit_status import status_of
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 rosbag2 = pytest.importorskip("rosbags.rosbag2")
 typesys = pytest.importorskip("rosbags.typesys")

@@ -18,9 +18,9 @@ import yourdfpy
 from numpy.typing import NDArray
 from surfaces import coincident, reach_down, surface
 
-from nmm.platforms import Car, DifferentialDrive, Layout, Mecanum, Tractor
-from nmm.robots.loading.measured_joints import Measured
-from nmm.robots.loading.measured_layout import measure_layout
+from nmm.model.platforms import Car, DifferentialDrive, Layout, Mecanum, Tractor
+from nmm.model.robots.loading.measured_joints import Measured
+from nmm.model.robots.loading.measured_layout import measure_layout
 
 pytestmark = pytest.mark.usefixtures("xacro_each_time")
 

@@ -104,7 +104,7 @@ def test_files_that_are_none(
         subprocess.run(["mkfifo", str(file)], check=True)
     else:
         monkeypatch.setattr("nmm.scenario.document.LONGEST", 1000)
-        monkeypatch.setattr("nmm.robots.loading.xml_tree.LONGEST", 1000)
+        monkeypatch.setattr("nmm.model.robots.loading.xml_tree.LONGEST", 1000)
         file.write_text(" " * 1001)
     assert status_of(["run" if suffix == ".yaml" else "info", str(file)]) == 2
     err = capsys.readouterr().err

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import nmm
-from nmm.robots.loading import budget
+from nmm.model.robots.loading import budget
 
 HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
 #: No bound takes longer to be met, s of processor.

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 import nmm
 from nmm import Configuration
 from nmm.functions.program import evaluate
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 Q = [0.1, -0.2, 0.3, 0.8, -0.5]

@@ -20,9 +20,9 @@ from nmm import Finding
 from nmm.base.bundled import bundled_robots
 from nmm.base.errors import RobotError
 from nmm.cli.exit_status import status_of
-from nmm.collisions.pairs import SAMPLES, link_names, query_shapes, touching, touching_links
-from nmm.robots.loading.packages import package_file
-from nmm.robots.loading.report import FileReport, file_report
+from nmm.model.collisions.pairs import SAMPLES, link_names, query_shapes, touching, touching_links
+from nmm.model.robots.loading.packages import package_file
+from nmm.model.robots.loading.report import FileReport, file_report
 
 pytestmark = pytest.mark.usefixtures("xacro_each_time")
 

@@ -9,10 +9,10 @@ from findings import refused
 import nmm
 from nmm import Scenario
 from nmm.base.errors import ScenarioError
-from nmm.collisions.pairs import random_configurations
 from nmm.functions.program import Program
-from nmm.robots.configuration import Configuration
-from nmm.robots.zero_order_hold import HeldInputs, RollingPreview
+from nmm.model.collisions.pairs import random_configurations
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.zero_order_hold import HeldInputs, RollingPreview
 
 
 def obstacles():

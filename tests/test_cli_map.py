@@ -13,8 +13,8 @@ from small_pictures import draw_only
 from nmm.base.errors import InputError
 from nmm.cli.exit_status import status_of
 from nmm.cli.mapping import map_measures
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading import load
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading import load
 
 POSITION: dict[str, Any] = {"task": ["position:ee:xy"], "samples": "24"}
 

@@ -21,7 +21,7 @@ from nmm.analysis import analyse, analyse_along
 from nmm.base.findings import Finding
 from nmm.cli.exit_status import status_of
 from nmm.functions.tasks import Heading, Position
-from nmm.robots.loading import load
+from nmm.model.robots.loading import load
 from nmm.runs.trajectory import Trajectory
 
 Command = Callable[..., Result]

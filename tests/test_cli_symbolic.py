@@ -17,7 +17,7 @@ from nmm.analysis import analyse
 from nmm.analysis.formulas.zeros import Limits
 from nmm.cli.exit_status import status_of
 from nmm.functions.tasks import Pose, Position
-from nmm.robots.loading import load
+from nmm.model.robots.loading import load
 
 Command = Callable[..., Result]
 

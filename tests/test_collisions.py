@@ -43,7 +43,7 @@ START = {"q1": 0.3, "q2": 0.6}
 
 def least_between(run, obstacles, robot):
     """An own look at every tenth of a step, along the arcs of held inputs, at all pairs."""
-    from nmm.robots.zero_order_hold import HeldInputs
+    from nmm.model.robots.zero_order_hold import HeldInputs
 
     setting, held = nmm.Collisions(DISTANCE, obstacles=obstacles).on(robot), HeldInputs(robot)
     found = []

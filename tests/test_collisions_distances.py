@@ -6,8 +6,8 @@ import pytest
 
 import nmm
 from nmm.base.kernels.record_layout import Memory, views
-from nmm.collisions.pairs import random_configurations
-from nmm.collisions.rows import Rows, no_rows
+from nmm.model.collisions.pairs import random_configurations
+from nmm.model.collisions.rows import Rows, no_rows
 
 
 def rows_at(setting, t, q, most=60):

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import nmm
-from nmm.collisions import swept as ways
-from nmm.collisions.pairs import random_configurations
-from nmm.collisions.swept_check import SweptCheck
-from nmm.robots.zero_order_hold import HeldInputs
+from nmm.model.collisions import swept as ways
+from nmm.model.collisions.pairs import random_configurations
+from nmm.model.collisions.swept_check import SweptCheck
+from nmm.model.robots.zero_order_hold import HeldInputs
 
 SHAPES = [
     nmm.Box([0.2, 0.5, 0.4]),
@@ -127,7 +127,7 @@ def test_distances_do_not_depend_on_what_was_asked_before(planar):
 FIRST_CALLS = """
 import gc
 import numpy as np
-from nmm.collisions.swept_check import Short
+from nmm.model.collisions.swept_check import Short
 from numba.core.dispatcher import Dispatcher
 
 robot = nmm.load("unicycle_3r")

@@ -30,6 +30,9 @@ from nmm.functions.objectives import Sum
 from nmm.functions.program import Program, evaluate
 from nmm.functions.tasks import LinearCoordinates, Task
 from nmm.functions.tasks.task import Comparison
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading import load
+from nmm.model.robots.robot import CENTER_OF_MASS, Robot
 from nmm.resolvers import (
     CallableResolver,
     DampedLeastSquares,
@@ -42,9 +45,6 @@ from nmm.resolvers import (
 from nmm.resolvers.answer import SINGULAR_J, SOLVED, AnswerArrays, unanswered
 from nmm.resolvers.base import ANSWER, resolve_one
 from nmm.resolvers.saturation import limit
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading import load
-from nmm.robots.robot import CENTER_OF_MASS, Robot
 
 Array = NDArray[np.float64]
 

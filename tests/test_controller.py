@@ -15,9 +15,9 @@ from nmm.control.controller import Controller
 from nmm.functions.objectives import Objective, Quadratic, QuadraticTerm
 from nmm.functions.references import Bearing, Circle, Constant, Line
 from nmm.functions.tasks import Heading, LinearCoordinates, Position, Task
-from nmm.platforms import WheeledPlatform
+from nmm.model.platforms import WheeledPlatform
+from nmm.model.robots.robot import Robot
 from nmm.resolvers import ExtendedJacobian, ProjectedGradient, ReducedGradient, Resolver, Status
-from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

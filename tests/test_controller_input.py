@@ -25,6 +25,9 @@ from nmm.functions.objectives import (
 from nmm.functions.program import evaluate
 from nmm.functions.references import Bearing, CallableReference, Circle, Constant, PiecewisePolynomial, Spline
 from nmm.functions.tasks import CallableFunction, Heading, LinearCoordinates, Position, Task
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading import load
+from nmm.model.robots.robot import Robot
 from nmm.resolvers import (
     CallableResolver,
     ExtendedJacobian,
@@ -33,9 +36,6 @@ from nmm.resolvers import (
     Resolver,
     Status,
 )
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading import load
-from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

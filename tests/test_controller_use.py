@@ -18,8 +18,8 @@ from nmm.functions.objectives import CallableObjective, Objective
 from nmm.functions.program import evaluate
 from nmm.functions.references import CallableReference
 from nmm.functions.tasks import CallableFunction, Task
+from nmm.model.robots.robot import Robot
 from nmm.resolvers import CallableResolver, Problem, ProjectedGradient, ReducedGradient
-from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

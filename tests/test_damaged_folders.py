@@ -18,7 +18,7 @@ import nmm
 from nmm.base.bundled import bundled_robots
 from nmm.cli.exit_status import status_of
 from nmm.cli.playing import runs_in
-from nmm.robots.loading.description import describe
+from nmm.model.robots.loading.description import describe
 
 
 @pytest.fixture(scope="module")

@@ -32,11 +32,11 @@ from nmm.functions.tasks import LinearCoordinates, MeasuredPoints, Position, Tas
 from nmm.functions.tasks.measured import MeasuredPoint
 from nmm.functions.tasks.pose import PartsOfPose
 from nmm.functions.tasks.task import Comparison
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 from nmm.plans.following import FromPlan
 from nmm.plans.parking import Parking
 from nmm.resolvers import ProjectedGradient
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from ports import MOST, served
 import nmm
 from nmm.base.resolver_style import resolver_styles
 from nmm.driving import DriveSetup, RobotSetup, ScenarioSetup, drive
-from nmm.robots.configuration import Configuration
+from nmm.model.robots.configuration import Configuration
 
 #: Where a point of a gizmo is in the window, px: its ball, or the tip of the arrow along an axis.
 WHERE = """([target, way, length]) => {

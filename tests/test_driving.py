@@ -29,8 +29,8 @@ from nmm.driving.driven import Driven, Reaching
 from nmm.driving.planning import Planning
 from nmm.driving.session import Aim, DriveSession, Order, Pick, parsed
 from nmm.driving.setups import DriveSetup, RobotSetup, ScenarioSetup, Settings
+from nmm.model.robots.configuration import Configuration
 from nmm.playback.rolling import Rolling
-from nmm.robots.configuration import Configuration
 
 KINDS = ("rg", "pg", "ej", "dls")
 

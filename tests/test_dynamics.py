@@ -13,8 +13,8 @@ import pytest
 import nmm
 from nmm.base.arrays import Array
 from nmm.cli.torques import torques
-from nmm.dynamics.support import Support, hull
-from nmm.dynamics.torques import accelerations, torques_along
+from nmm.model.dynamics.support import Support, hull
+from nmm.model.dynamics.torques import accelerations, torques_along
 from nmm.playback.channels import channels, events
 from nmm.runs.table import summary_rows
 

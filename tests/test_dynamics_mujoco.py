@@ -16,7 +16,7 @@ from test_dynamics import moving, robot_of
 
 import nmm
 from nmm.base.arrays import Array
-from nmm.dynamics.support import Support
+from nmm.model.dynamics.support import Support
 
 mujoco = pytest.importorskip("mujoco")
 

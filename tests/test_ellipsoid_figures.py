@@ -17,10 +17,10 @@ from nmm.base.arrays import Array
 from nmm.base.errors import InputError
 from nmm.cli.exit_status import status_of
 from nmm.figures.ellipses import ellipses
+from nmm.model.robots.motion import Motion
 from nmm.playback.ellipsoids import CLOSE, EllipsoidOptions, SceneEllipsoids, between_error
 from nmm.playback.extent import extent_of
 from nmm.playback.keyframes import Keyframes
-from nmm.robots.motion import Motion
 
 # What the page shows between its frames
 

@@ -12,8 +12,8 @@ import nmm
 from nmm.analysis.singular.ellipsoids import Ellipsoids, carried_frame, ellipsoids_along, frame_of
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError
+from nmm.model.robots.configuration import Configuration
 from nmm.playback.ellipsoids import EllipsoidOptions
-from nmm.robots.configuration import Configuration
 
 #: A planar robot, a spatial one, an arm on a fixed base, one on a car, one with more inputs than it needs.
 ROBOTS = ("unicycle_2r", "unicycle_3r", "small_arm", "car with arm", "omni with arm")

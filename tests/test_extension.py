@@ -24,13 +24,13 @@ from nmm.functions.function import Function, Row, Shown, Stage
 from nmm.functions.objectives import Manipulability, Sum
 from nmm.functions.references import Line
 from nmm.functions.tasks import CallableFunction, Position, Task
-from nmm.platforms import Platform
+from nmm.model.platforms import Platform
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 from nmm.resolvers import Dimensions, Problem, ProjectedGradient, ReducedGradient, Resolver, Setup, State
 from nmm.resolvers.answer import AnswerArrays, certify
 from nmm.resolvers.base import RESOLVER
 from nmm.resolvers.problem_arrays import ProblemArrays
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
 from nmm.runs.simulation import simulate
 from nmm.runs.trajectory import Trajectory
 

@@ -16,10 +16,10 @@ from findings import holds, of_code, refused_for
 from urdf_parts import AXIS, LIMIT, inertial, joint, link, numbers, robot, shape, write
 
 import nmm
-from nmm.robots.loading.file_elements import READ, SRDF, URDF
-from nmm.robots.loading.packages import package_file
-from nmm.robots.loading.provenance import accelerations_of
-from nmm.robots.loading.report import file_report
+from nmm.model.robots.loading.file_elements import READ, SRDF, URDF
+from nmm.model.robots.loading.packages import package_file
+from nmm.model.robots.loading.provenance import accelerations_of
+from nmm.model.robots.loading.report import file_report
 from nmm.scaffold import first_scenario
 
 UNREAD = ("element_unknown", "attribute_unknown", "element_unread", "attribute_unread", "element_again")

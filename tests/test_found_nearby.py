@@ -10,7 +10,7 @@ from urdf_parts import link, robot, shape, write
 
 import nmm
 from nmm.cli.exit_status import status_of
-from nmm.robots.loading.report import file_report
+from nmm.model.robots.loading.report import file_report
 
 MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 XACRO = 'name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"'

@@ -13,7 +13,7 @@ from findings import codes
 
 import nmm
 from nmm.base.arrays import Array
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 from nmm.ros.difference import difference
 
 TURN = 2.0 * np.pi

@@ -27,8 +27,8 @@ from nmm.functions.references import (
     VelocityOf,
 )
 from nmm.functions.tasks import Heading, LinearCoordinates, Orientation, Pointing, Pose, Position
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -22,8 +22,8 @@ from nmm.base.files import whole_file
 from nmm.cli.exit_status import status_of
 from nmm.cli.subjects import configuration_at
 from nmm.folders import run as folders_run
+from nmm.model.robots.reach import first_tip, tips
 from nmm.playback.channels import channels
-from nmm.robots.reach import first_tip, tips
 from nmm.scaffold.end_effector import hands
 from nmm.scenario.short_task import short_task
 

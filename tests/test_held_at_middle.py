@@ -5,8 +5,8 @@ import pytest
 from findings import refused
 
 import nmm
-from nmm.robots.robot import Robot
-from nmm.robots.zero_order_hold import HeldInputs
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.zero_order_hold import HeldInputs
 from nmm.runs import closed_loop
 
 DT = 0.01

@@ -7,7 +7,7 @@ import pytest
 
 import nmm
 from nmm.control.idle_inputs import idle_inputs, inputs_without_effect
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 START = {"q2": 0.2, "q3": 1.7, "q4": 0.6}
 TIP = [0.6, 0.1, 0.58]

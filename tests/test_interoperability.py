@@ -13,8 +13,8 @@ from urdf_parts import joint, link, random_tree, robot, shape, write
 
 import nmm
 from nmm import PinocchioLayout
-from nmm.platforms import FixedBase, Unicycle
-from nmm.robots.robot import Robot
+from nmm.model.platforms import FixedBase, Unicycle
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

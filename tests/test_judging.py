@@ -9,8 +9,8 @@ import nmm
 from nmm.control.idle_inputs import _configurations
 from nmm.diagnosis.assessment import linearisation, linearisations
 from nmm.diagnosis.error_bound import SAFETY, Feedback, Samples, step_errors
-from nmm.robots.frame_path import FramePath
-from nmm.robots.robot import CENTER_OF_MASS
+from nmm.model.robots.frame_path import FramePath
+from nmm.model.robots.robot import CENTER_OF_MASS
 
 CASES = ("unicycle_2r_position", "tiago_tray", "unicycle_2r_switching")
 

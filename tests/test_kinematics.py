@@ -10,10 +10,10 @@ from robot_grid import BASES, DATA, built
 import nmm
 from nmm.base.bundled import bundled_robots, bundled_scenarios
 from nmm.base.kernels.kinematics import place_frames
-from nmm.collisions.pairs import random_configurations
-from nmm.robots.configuration import kinematics_updater
-from nmm.robots.joint_table import frame_table
-from nmm.robots.robot import CENTER_OF_MASS
+from nmm.model.collisions.pairs import random_configurations
+from nmm.model.robots.configuration import kinematics_updater
+from nmm.model.robots.joint_table import frame_table
+from nmm.model.robots.robot import CENTER_OF_MASS
 
 #: One of each family: trees, closed hands, sliding joints, unaligned axes.
 STRANGERS = [

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from urdf_parts import joint, link, robot, write
 
 import nmm
-from nmm.platforms import Unicycle
-from nmm.robots.robot import Robot
+from nmm.model.platforms import Unicycle
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 START = {"q1": 0.3, "q2": 0.6}

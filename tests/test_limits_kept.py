@@ -14,8 +14,8 @@ from wandering import DT, ROBOTS, beyond, wander, wanderer
 import nmm
 from nmm.control import bounds
 from nmm.control.integrators import integrator
+from nmm.model.robots.robot import Robot
 from nmm.resolvers.answer import Status
-from nmm.robots.robot import Robot
 
 Array = np.ndarray
 ROBOT = nmm.load("unicycle_3r")

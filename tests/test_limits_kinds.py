@@ -14,8 +14,8 @@ from findings import every, refused, the
 from gripping import FINGERS, panda
 
 import nmm
+from nmm.model.robots.robot import Robot
 from nmm.playback.rolling import Rolling
-from nmm.robots.robot import Robot
 from nmm.runs.margins import margin, shares
 
 Array = np.ndarray

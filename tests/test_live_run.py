@@ -18,10 +18,10 @@ from live_pages import LivePage, dead_page, live, unpacked
 from ports import MOST, listening, wait_for
 
 import nmm
+from nmm.model.robots.configuration import Configuration
 from nmm.playback import LiveRun
 from nmm.playback.running import ALL, KEPT
 from nmm.playback.session import AHEAD, FPS, Watching, counted
-from nmm.robots.configuration import Configuration
 from nmm.runs.trajectory import Trajectory
 
 DT = 0.005

@@ -20,10 +20,10 @@ from nmm.functions.function import Function
 from nmm.functions.program import Program, evaluate
 from nmm.functions.references import Bearing, Circle, Constant, Line, LiveTarget, PoseReference
 from nmm.functions.tasks import Distance, Heading, Orientation, Pointing, Pose, Position, Posture, Task
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading import mount
+from nmm.model.robots.robot import Robot
 from nmm.resolvers import ProjectedGradient
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading import mount
-from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -22,9 +22,9 @@ from urdf_parts import AXIS, LIMIT, inertial, joint, link, random_tree, robot, s
 import nmm.base.bundled as bundled
 from nmm.base.bundled import bundled_robots, bundled_scenarios
 from nmm.base.errors import InputError, NmmError, RobotError
-from nmm.platforms import PLATFORMS, Layout, Unicycle
-from nmm.robots.loading import load
-from nmm.robots.robot import Robot
+from nmm.model.platforms import PLATFORMS, Layout, Unicycle
+from nmm.model.robots.loading import load
+from nmm.model.robots.robot import Robot
 
 pytestmark = pytest.mark.usefixtures("xacro_each_time")
 

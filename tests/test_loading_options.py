@@ -71,7 +71,7 @@ def test_patterns_that_cannot_be_locked(path: Path, lock: dict[str, float], wher
 
 
 def test_the_platforms_own_joints_are_not_meant() -> None:
-    robot = nmm.load("car_base", platform=nmm.platforms.Car(0.7), lock={"*steer*": 0.0})
+    robot = nmm.load("car_base", platform=nmm.model.platforms.Car(0.7), lock={"*steer*": 0.0})
     assert robot.q_names == ("x", "y", "theta", "steering")
 
 

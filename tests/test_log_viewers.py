@@ -23,7 +23,7 @@ from nmm.ros.description import packaged
 STRUCTS = {"/odom": "Odometry", "/path": "Path", "/desired_path": "Path", "/cmd_vel": "TwistStamped"}
 
 
-def driven(made: nmm.robots.robot.Robot, folder: Path) -> tuple[nmm.Trajectory, Path]:
+def driven(made: nmm.model.robots.robot.Robot, folder: Path) -> tuple[nmm.Trajectory, Path]:
     """A run on a robot whose platform and arm move; the log begins in this century."""
     frame = "panda_hand" if "panda_hand" in made.frames else "grasp" if "grasp" in made.frames else "ee"
     start = made.following.placed(np.clip(np.linspace(0.1, 0.5, made.n), *made.q_limits.T))

@@ -21,10 +21,10 @@ from urdf_parts import joint, link, robot, shape, write
 
 import nmm
 from nmm import RobotError
-from nmm.robots import mesh_files, meshes
-from nmm.robots.loading.check_parts import MESH_SUFFIXES
-from nmm.robots.loading.packages import package_file
-from nmm.robots.robot import Robot
+from nmm.model.robots import mesh_files, meshes
+from nmm.model.robots.loading.check_parts import MESH_SUFFIXES
+from nmm.model.robots.loading.packages import package_file
+from nmm.model.robots.robot import Robot
 
 DATA = "package://example-robot-data/robots/"
 FINGERS = {"panda_finger_joint1": 0.01}
@@ -213,7 +213,7 @@ def eagerly(monkeypatch: pytest.MonkeyPatch, make: Callable[[], Robot]) -> Robot
         meshes.read_meshes([part], "eager")
 
     with monkeypatch.context() as patch:
-        patch.setattr("nmm.robots.loading.source.leave_unread", read_now)
+        patch.setattr("nmm.model.robots.loading.source.leave_unread", read_now)
         return make()
 
 
@@ -351,7 +351,7 @@ def test_all_that_cannot_be_read_is_named(tmp_path: Path) -> None:
 
 
 def test_a_check_reads_the_meshes(tmp_path: Path) -> None:
-    from nmm.robots.loading.report import file_report
+    from nmm.model.robots.loading.report import file_report
 
     write(tmp_path / "junk.stl", "junk")
     path = meshed(tmp_path, "junk.stl")

@@ -27,11 +27,11 @@ from nmm.analysis.singular.jacobians import Jacobians
 from nmm.analysis.singular.singularity import analyse
 from nmm.base.errors import InputError, RobotError
 from nmm.cli.exit_status import status_of
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading.packages import package_file
+from nmm.model.robots.mimic_joints import MimicJoint
+from nmm.model.robots.robot import Robot
 from nmm.playback.viewer import viewer_scene
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading.packages import package_file
-from nmm.robots.mimic_joints import MimicJoint
-from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ from findings import holds, of_code, refused_for
 from urdf_parts import write
 
 import nmm
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading.report import file_report
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading.report import file_report
 
 ARM = """<mujoco model="arm">
   <compiler angle="degree" eulerseq="XYZ" meshdir="meshes"/>

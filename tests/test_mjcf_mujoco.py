@@ -12,8 +12,8 @@ from findings import assert_found, holds, of_code, refused_for
 from urdf_parts import write
 
 import nmm
-from nmm.robots.loading.mjcf_parts import ELEMENTS, _of_class, how_of, row_of
-from nmm.robots.loading.report import file_report
+from nmm.model.robots.loading.mjcf_parts import ELEMENTS, _of_class, how_of, row_of
+from nmm.model.robots.loading.report import file_report
 
 mujoco: Any = pytest.importorskip("mujoco")
 

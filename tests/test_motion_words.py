@@ -22,9 +22,9 @@ from nmm.analysis.redundancy.motion_words import (
 )
 from nmm.analysis.redundancy.report import redundancy
 from nmm.functions.tasks import Position
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading import load
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading import load
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

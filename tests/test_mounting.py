@@ -19,9 +19,9 @@ from urdf_parts import inertial, joint, link, numbers, random_tree, robot, shape
 
 import nmm
 from nmm import RobotError, Scenario, ScenarioError
-from nmm.platforms import FixedBase
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
+from nmm.model.platforms import FixedBase
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -22,9 +22,9 @@ import nmm
 from nmm.cli.app import app
 from nmm.cli.exit_status import main, status_of
 from nmm.cli.output import readable, show_table, show_text
+from nmm.model.robots.motion import Motion
 from nmm.playback import write_html
 from nmm.rendering.encoder import expect_video
-from nmm.robots.motion import Motion
 
 MOST = 120.0
 #: NMM_KILLS=30 interrupts so often.

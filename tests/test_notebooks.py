@@ -17,8 +17,8 @@ from playback_robot import drive
 
 import nmm
 from nmm.base.errors import InputError
+from nmm.model.robots.robot import Robot
 from nmm.playback import Page
-from nmm.robots.robot import Robot
 
 
 @pytest.fixture(scope="module")

@@ -19,8 +19,8 @@ from scipy.integrate import solve_ivp
 import nmm
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError
-from nmm.robots.robot import Robot
-from nmm.robots.wheel_rates import wheel_rates, wheel_shares
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.wheel_rates import wheel_rates, wheel_shares
 
 CASES: dict[str, dict[str, str]] = {
     "differential_base": {},

@@ -20,9 +20,9 @@ import nmm
 from nmm.control.directions import in_world_axes, lost_directions
 from nmm.diagnosis.error_bound import Feedback, accumulated, decay, expected_decay
 from nmm.diagnosis.jumps import chattering
+from nmm.model.robots.reach import joint_position, reach
+from nmm.model.robots.robot import Robot
 from nmm.resolvers import Answer, Problem, Status
-from nmm.robots.reach import joint_position, reach
-from nmm.robots.robot import Robot
 
 START = {"x": -1, "y": -1, "theta": pi}
 TIP = nmm.Task(nmm.Position("ee", "xy"), nmm.Circle([2, 2], 3, 0.08 * pi, 5 / 4 * pi))

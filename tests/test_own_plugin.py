@@ -243,7 +243,7 @@ def test_what_of_a_plugin_fails_is_left_out(faulty: Installed) -> None:
     assert "hollow:PLUGIN is no nmm.extending.Section; it is left out" in done.stderr
     code = "import nmm; print(nmm.load.__module__, str(nmm.Finding('interrupted_judging'))); nmm.hollow_name"
     done = faulty.python("-c", code)
-    assert done.stdout == "nmm.robots.loading.load interrupted while the run was judged\n"
+    assert done.stdout == "nmm.model.robots.loading.load interrupted while the run was judged\n"
     assert "AttributeError: No nmm attribute hollow_name" in done.stderr
 
 

@@ -10,10 +10,10 @@ from playback_browser import window as window
 from playwright.sync_api import Browser
 from ports import MOST
 
+from nmm.model.robots.robot import Robot
 from nmm.playback import LiveViewer
 from nmm.playback.html import socket_page
 from nmm.playback.server import PageServer
-from nmm.robots.robot import Robot
 
 
 def test_a_page_by_the_name_of_this_machine_is_told_all_the_same(

@@ -14,9 +14,9 @@ from paper_cases import CASES, Case
 
 from nmm.functions.program import evaluate
 from nmm.functions.tasks import Heading, Position
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading import load
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading import load
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

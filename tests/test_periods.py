@@ -14,8 +14,8 @@ from nmm.base.errors import InputError
 from nmm.control.controller import Controller
 from nmm.functions.references import Bearing, Circle, Constant, Line, PoseReference, Spline, SteadyTurn
 from nmm.functions.tasks import Heading, Orientation, Pose, Position, Task
+from nmm.model.robots.robot import Robot
 from nmm.resolvers import ProjectedGradient
-from nmm.robots.robot import Robot
 from nmm.scenario import Scenario
 
 Array = NDArray[np.float64]

@@ -173,7 +173,7 @@ def test_wheels_keep_their_limits():
     limits = nmm.Limits(wheels=3.0, acceleration=1.0)
     plan = nmm.plan(robot, robot.rest, {"x": 1.0, "y": 1.0, "theta": 0.0}, limits=limits)
     q, u = plan(np.linspace(0.0, plan.duration, 500))
-    from nmm.robots.wheel_rates import turning_wheels
+    from nmm.model.robots.wheel_rates import turning_wheels
 
     _, rates = turning_wheels(robot, q, np.array([robot.S(a) @ b for a, b in zip(q, u, strict=True)]))
     assert 3.0 - 1e-6 < np.abs(rates).max() <= 3.0 + 1e-11

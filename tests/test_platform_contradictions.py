@@ -13,7 +13,7 @@ from urdf_parts import write
 import nmm
 from nmm import Finding
 from nmm.cli.exit_status import status_of
-from nmm.platforms import (
+from nmm.model.platforms import (
     Car,
     DifferentialDrive,
     FixedWheel,
@@ -27,7 +27,7 @@ from nmm.platforms import (
     Unicycle,
     WheeledPlatform,
 )
-from nmm.robots.loading.provenance import provenance_of
+from nmm.model.robots.loading.provenance import provenance_of
 
 AXLE = [
     FixedWheel(f"rear_{side}_wheel_joint", 0, y, RADIUS) for side, y in (("left", 0.28), ("right", -0.28))

@@ -11,7 +11,7 @@ import pytest
 from findings import refused
 from numpy import pi
 
-from nmm.platforms import (
+from nmm.model.platforms import (
     Car,
     DifferentialDrive,
     FixedBase,

@@ -16,7 +16,7 @@ from platform_wheels import bodies, contacts, slips
 from scipy.linalg import expm
 
 from nmm.base.errors import InputError
-from nmm.platforms import (
+from nmm.model.platforms import (
     PLATFORMS,
     Car,
     DifferentialDrive,

@@ -16,14 +16,14 @@ from playback_robot import drive, hand_built_robot, straight
 
 from nmm.base.errors import InputError, RobotError
 from nmm.base.files import UnwrittenError
-from nmm.platforms import Unicycle
+from nmm.model.platforms import Unicycle
+from nmm.model.robots.robot import Robot
 from nmm.playback import Motion, play, wheel_angles, wheel_rates, write_html
 from nmm.playback.keyframes import LARGEST_TURN, ghost_samples, ghost_times, keyframes
 from nmm.playback.meshes import OFF
 from nmm.playback.placements import Placements
 from nmm.playback.scene import playback_scene
 from nmm.playback.shapes import Shape, shapes
-from nmm.robots.robot import Robot
 
 fcl = pin.hppfcl
 SHARE = Path(sys.prefix) / "lib" / f"python{sys.version_info[0]}.{sys.version_info[1]}" / "site-packages"

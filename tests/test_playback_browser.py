@@ -30,14 +30,14 @@ from playwright.sync_api import Page
 from ports import MOST, listening, start_player
 
 import nmm
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 from nmm.playback import LiveViewer, Motion
 from nmm.playback.ellipsoids import CLOSE, THINNEST, EllipsoidOptions
 from nmm.playback.extent import corners, robot_boxes
 from nmm.playback.keyframes import ghost_samples, ghost_times, keyframes
 from nmm.playback.placements import Placements
 from nmm.playback.rolling import wheel_angles
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
 
 #: Box around the vertices below each visual, in the visual's own frame.
 BOXES = """() => {

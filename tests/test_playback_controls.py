@@ -24,9 +24,9 @@ from playback_browser import window as window
 from playback_robot import drive
 from playwright.sync_api import Browser
 
+from nmm.model.robots.robot import Robot
 from nmm.playback import Motion
 from nmm.playback.rolling import wheel_angles
-from nmm.robots.robot import Robot
 
 #: A page that holds one of ours.
 OUTER = (

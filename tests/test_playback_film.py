@@ -13,8 +13,8 @@ from playback_browser import Window, browser, empty_page, file_url, small_robot,
 from playback_robot import drive
 from playwright.sync_api import Page
 
+from nmm.model.robots.robot import Robot
 from nmm.rendering.encoder import find_ffmpeg
-from nmm.robots.robot import Robot
 
 FILM = """async (told) => {
   const shares = [];

@@ -15,7 +15,7 @@ from playback_browser import window as window
 from playback_robot import drive
 from playwright.sync_api import Browser, Page
 
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 
 @pytest.fixture(scope="module")

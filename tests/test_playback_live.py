@@ -16,8 +16,8 @@ from playback_robot import drive, hand_built_robot, straight
 from ports import MOST, free_port, listening, start_player, wait_for
 
 from nmm.base.errors import InputError, RunError
+from nmm.model.robots.robot import Robot
 from nmm.playback import LiveViewer, play, wheel_angles
-from nmm.robots.robot import Robot
 
 
 @pytest.fixture(scope="module")

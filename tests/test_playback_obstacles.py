@@ -15,8 +15,8 @@ from playback_browser import empty_page as empty_page
 from playback_browser import window as window
 
 import nmm
-from nmm.collisions.obstacle import Passed, obstacle_as_json, obstacle_from_json, shape_from_json
 from nmm.figures.motion import outlines
+from nmm.model.collisions.obstacle import Passed, obstacle_as_json, obstacle_from_json, shape_from_json
 from nmm.playback import Motion, Surroundings
 from nmm.playback.obstacles import REACH
 from nmm.playback.scene import playback_scene
@@ -216,7 +216,7 @@ def test_the_line_is_red_below_the_distance_asked(window: Window, tmp_path: Path
     t = np.linspace(0.0, 2.0, 101)
     q, u = np.tile(robot.q(), (101, 1)), np.zeros((101, robot.n_u))
     found = swept(setting, t, q, u, [setting.places(time) for time in t])
-    nearest = nmm.robots.motion.Nearest(
+    nearest = nmm.model.robots.motion.Nearest(
         found.points, found.clearance, found.pairs, tuple(map(" and ".join, setting.names)), 0.05
     )
     page = window.open(file_url([nmm.playback.Motion(robot, t, q, u, nearest=nearest)], tmp_path))

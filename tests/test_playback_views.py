@@ -15,10 +15,10 @@ from playback_browser import small_robot as small_robot
 from playback_browser import window as window
 from playback_robot import drive, hand_built_robot
 
+from nmm.model.robots.robot import Robot
 from nmm.playback import Motion, Surroundings
 from nmm.playback.extent import corners, robot_boxes
 from nmm.playback.rolling import wheel_angles
-from nmm.robots.robot import Robot
 
 
 @pytest.fixture(scope="module")

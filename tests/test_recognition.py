@@ -19,7 +19,7 @@ from wheeled_cases import CASES, DRIVE, Case, all_corners, corners, pair, steere
 
 import nmm
 from nmm.cli.exit_status import status_of
-from nmm.robots.loading.report import file_report
+from nmm.model.robots.loading.report import file_report
 
 
 def loaded(tmp_path: Path, case: Case, **more: Any) -> nmm.Robot:

@@ -28,9 +28,9 @@ from ports import MOST
 
 import nmm
 from nmm.base.errors import InputError, RunError
+from nmm.model.robots.robot import Robot
 from nmm.rendering import encoder, render
 from nmm.rendering.chromium import HeadlessPage
-from nmm.robots.robot import Robot
 
 SMALL = (160, 96)
 

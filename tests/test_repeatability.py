@@ -19,8 +19,8 @@ from nmm.control.controller import Controller
 from nmm.figures.repeatability import laps as laps_figure
 from nmm.functions.references import Circle
 from nmm.functions.tasks import Heading, LinearCoordinates, Position, Task
+from nmm.model.robots.robot import Robot
 from nmm.resolvers import CallableResolver, ExtendedJacobian, Problem, ProjectedGradient
-from nmm.robots.robot import Robot
 from nmm.scenario import Scenario
 
 Array = NDArray[np.float64]

@@ -19,8 +19,8 @@ from urdf_parts import joint, link, random_tree, robot, shape, write
 import nmm
 from nmm.base.arrays import Array
 from nmm.cli.exit_status import status_of
+from nmm.model.robots.robot import Robot
 from nmm.playback.placements import rolling_joints
-from nmm.robots.robot import Robot
 from nmm.ros.description import description, packaged
 from nmm.ros.links import Links
 from nmm.ros.making import root_link

@@ -15,7 +15,7 @@ from wandering import beyond
 import nmm
 from nmm.base.findings import Finding
 from nmm.findings.loop import WORDS
-from nmm.robots.zero_order_hold import HeldInputs
+from nmm.model.robots.zero_order_hold import HeldInputs
 from nmm.runs.measured_state import Refused
 
 Array = np.ndarray

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 import nmm
 from nmm.base import machine
-from nmm.robots.zero_order_hold import HeldInputs
+from nmm.model.robots.zero_order_hold import HeldInputs
 from nmm.rollouts import kept
 from nmm.rollouts.kept import least_singular_value
 

@@ -15,7 +15,7 @@ from gripping_cart import cart
 
 import nmm
 from nmm.base.errors import InputError
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 typesys = pytest.importorskip("rosbags.typesys")
 STORE = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)

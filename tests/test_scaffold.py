@@ -19,8 +19,8 @@ from nmm.base.bundled import bundled_robots
 from nmm.cli.exit_status import status_of
 from nmm.figures.style import figure, save
 from nmm.folders.run import is_run
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading.packages import package_file
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading.packages import package_file
 from nmm.scaffold.end_effector import hands
 
 DATA = "package://example-robot-data/robots/"

@@ -16,7 +16,7 @@ import nmm.resolvers
 from nmm import Scenario, ScenarioError
 from nmm.base import kinds
 from nmm.control.integrators import METHODS
-from nmm.robots.configuration import Configuration
+from nmm.model.robots.configuration import Configuration
 from nmm.scenario.collisions import SHAPE_PARTS
 from nmm.scenario.constructors import MadePart, documented, parameters
 from nmm.scenario.functions import FUNCTION_PARTS, REFERENCE_PARTS

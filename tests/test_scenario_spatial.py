@@ -14,8 +14,8 @@ from short_scenario import scenario
 
 import nmm
 from nmm import Scenario, ScenarioError, rotation_vector
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading.packages import Packages
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading.packages import Packages
 
 PI = math.pi
 #: Six joints on a unicycle: enough for a pose. Its first joint's link is `shoulder_link`, its tip `tool0`.

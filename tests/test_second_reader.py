@@ -15,11 +15,11 @@ from urdf_parts import inertial, joint, link, random_tree, robot, write
 
 import nmm
 from nmm.base.bundled import bundled_robots
-from nmm.robots.loading.check import check_mimics, inspect
-from nmm.robots.loading.description import describe
-from nmm.robots.loading.packages import package_file
-from nmm.robots.loading.xml_tree import Attributes, children, parse
-from nmm.robots.mimic_joints import first_leaders
+from nmm.model.robots.loading.check import check_mimics, inspect
+from nmm.model.robots.loading.description import describe
+from nmm.model.robots.loading.packages import package_file
+from nmm.model.robots.loading.xml_tree import Attributes, children, parse
+from nmm.model.robots.mimic_joints import first_leaders
 
 #: Largest difference of placements, m and of rotation matrices' entries.
 SAME = 1e-6

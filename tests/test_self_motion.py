@@ -19,9 +19,9 @@ from nmm.analysis.redundancy.moving import SelfMotion, self_motion
 from nmm.analysis.redundancy.report import redundancy
 from nmm.base.errors import InputError, SingularError
 from nmm.functions.tasks import Pose, Position, Task
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 from nmm.playback import write_html
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

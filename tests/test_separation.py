@@ -17,9 +17,9 @@ from nmm.collisions.legs_check import (
     speed_towards,
 )
 from nmm.collisions.motion_check import MotionCheck
-from nmm.collisions.pairs import random_configurations
-from nmm.collisions.separation import CLOSE
-from nmm.robots.zero_order_hold import HeldInputs
+from nmm.model.collisions.pairs import random_configurations
+from nmm.model.collisions.separation import CLOSE
+from nmm.model.robots.zero_order_hold import HeldInputs
 
 SHAPES = {
     "box": (nmm.Box([0.3, 0.8, 1.0]), [1.6, 0.2, 0.5, 0.2, 0.1, 0.4]),

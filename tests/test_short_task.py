@@ -27,9 +27,9 @@ from nmm.functions.tasks import (
     Posture,
     Task,
 )
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading import load, mount
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading import load, mount
+from nmm.model.robots.robot import Robot
 from nmm.scenario.short_task import short_task
 
 

@@ -10,7 +10,7 @@ from numpy import pi
 import nmm
 from nmm.control.integrators import METHODS
 from nmm.diagnosis.assessment import instabilities
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 START = {"x": -1, "y": -1, "theta": pi}
 CIRCLE = nmm.Circle([2, 2], 3, 0.08 * pi, 5 / 4 * pi)

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 import nmm
 from nmm.cli.runs import describe
-from nmm.platforms import Platform, SkidSteer
+from nmm.model.platforms import Platform, SkidSteer
+from nmm.model.robots.loading.ground import slip_warnings
 from nmm.playback import Motion, wheel_angles, wheel_rates
-from nmm.robots.loading.ground import slip_warnings
 
 Array = NDArray[np.float64]
 

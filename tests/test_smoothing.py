@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import nmm
+from nmm.model.robots.wheel_rates import turning_wheels
+from nmm.model.robots.zero_order_hold import inputs_of
 from nmm.plans.plan import Asked
 from nmm.plans.samples import flow
 from nmm.plans.search import Search
 from nmm.plans.search_space import USUAL
 from nmm.plans.smoothing import Smoothing
-from nmm.robots.wheel_rates import turning_wheels
-from nmm.robots.zero_order_hold import inputs_of
 
 LIMITS = nmm.Limits(velocity={"platform": 1.0, "arm": 1.5}, acceleration={"platform": 1.0, "arm": 3.0})
 WALL = nmm.Obstacle(nmm.Box([0.2, 4.0, 2.0]), [3.0, 0.0, 0.5], name="wall")

@@ -29,8 +29,8 @@ from nmm.functions.tasks import (
     Posture,
     Task,
 )
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -25,8 +25,8 @@ from nmm.functions.tasks import (
     Task,
 )
 from nmm.functions.tasks.task import Comparison
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ from urdf_parts import joint, link, robot, write
 
 import nmm
 from nmm.cli.exit_status import status_of
-from nmm.robots.loading.packages import package_file
-from nmm.robots.loading.srdf import read_srdf
+from nmm.model.robots.loading.packages import package_file
+from nmm.model.robots.loading.srdf import read_srdf
 
 DATA = "package://example-robot-data/robots/"
 

@@ -11,9 +11,9 @@ from findings import holds, of_code
 from urdf_parts import AXIS, LIMIT, joint, link, robot, shape, write
 
 import nmm
-from nmm.robots.loading.report import file_report
-from nmm.robots.loading.srdf import Group
-from nmm.robots.loading.srdf_fitting import _groups
+from nmm.model.robots.loading.report import file_report
+from nmm.model.robots.loading.srdf import Group
+from nmm.model.robots.loading.srdf_fitting import _groups
 
 SOLID = shape('<box size="0.1 0.1 0.1"/>', "collision")
 BASE = '<virtual_joint name="odom" type="{}" parent_frame="map" child_link="{}"/>'

@@ -55,7 +55,7 @@ import sys
 import numpy as np
 import nmm
 from nmm.base.kernels.compiled import allocating
-from nmm.robots.zero_order_hold import RollingPreview
+from nmm.model.robots.zero_order_hold import RollingPreview
 q, _ = RollingPreview(nmm.load("unicycle_2r"))(np.zeros(5), 0.5)
 assert abs(q[0] - 0.5) < 1e-12
 print("numba.np.linalg" in sys.modules)

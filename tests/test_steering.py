@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 import nmm
 from nmm.control.steering import Steered
-from nmm.platforms import FixedWheel, SteeredWheel, Tractor, Trailer, WheeledPlatform
-from nmm.robots.robot import Robot
+from nmm.model.platforms import FixedWheel, SteeredWheel, Tractor, Trailer, WheeledPlatform
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

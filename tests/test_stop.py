@@ -8,7 +8,7 @@ from scipy.optimize import linprog
 from wandering import DT, beyond, wanderer
 
 import nmm
-from nmm.robots.zero_order_hold import HeldInputs
+from nmm.model.robots.zero_order_hold import HeldInputs
 
 Array = np.ndarray
 TOLERANCE = 1e-9

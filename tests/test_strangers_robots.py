@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from urdf_parts import inertial, joint, link, robot, write
 
 import nmm
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading.ground import slipping_wheels
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading.ground import slipping_wheels
 
 Array = NDArray[np.float64]
 

@@ -34,8 +34,8 @@ from nmm.analysis.formulas.zeros import Basis, Limits, Undecided, Zeros
 from nmm.base.errors import InputError
 from nmm.base.findings import Finding
 from nmm.functions.tasks import Heading, LinearCoordinates, Position
-from nmm.platforms import Omnidirectional
-from nmm.robots.loading import load
+from nmm.model.platforms import Omnidirectional
+from nmm.model.robots.loading import load
 
 Array = NDArray[np.float64]
 

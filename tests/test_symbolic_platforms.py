@@ -34,8 +34,8 @@ from nmm.functions.tasks import (
     Posture,
     Task,
 )
-from nmm.platforms import Platform
-from nmm.robots.robot import Robot
+from nmm.model.platforms import Platform
+from nmm.model.robots.robot import Robot
 
 LEVEL = '<axis xyz="0 1 0"/>'
 #: Inputs of its own choice make it divide by square roots.

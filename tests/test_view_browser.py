@@ -29,11 +29,11 @@ from playwright.sync_api import Page
 from ports import MOST, free_port, listening, served
 
 import nmm
+from nmm.model.robots.robot import Robot
 from nmm.playback import view
 from nmm.playback.extent import corners
 from nmm.playback.rolling import Rolling
 from nmm.playback.viewer import asked_for
-from nmm.robots.robot import Robot
 
 
 @pytest.fixture(scope="module", params=["hand-built", "unicycle_3r", "folding", "car_base"])

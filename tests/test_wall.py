@@ -35,7 +35,10 @@ EXCEPTIONS = {
     ("nmm.control.equations", "step"): "what a run needs is compiled beforehand, in other processes",
     ("nmm.functions.program", "PLACE"): "what a run needs is compiled beforehand, in other processes",
     ("nmm.functions.program", "place"): "what a run needs is compiled beforehand, in other processes",
-    ("nmm.robots.frame_path", "follow_frame"): "what a run needs is compiled beforehand, in other processes",
+    (
+        "nmm.model.robots.frame_path",
+        "follow_frame",
+    ): "what a run needs is compiled beforehand, in other processes",
     (
         "nmm.base.kernels.spectra",
         "WRITE_SPECTRA",
@@ -52,10 +55,10 @@ EXCEPTIONS = {
         "DIFFERENCE_STEP",
     ): "differences of the same step as those of users' functions",
     ("nmm.base.kernels", "records"): "the kernels' records, as a module, traced with symbols",
-    ("nmm.collisions.pairs", "measured_pairs"): "a scenario's draft leaves out pairs that touch",
-    ("nmm.collisions.pairs", "random_configurations"): "a scenario's draft leaves out pairs that touch",
-    ("nmm.collisions.pairs", "HULLS"): "a scenario's draft leaves out pairs that touch",
-    ("nmm.collisions.pairs", "query_shapes"): "a scenario's draft leaves out pairs that touch",
+    ("nmm.model.collisions.pairs", "measured_pairs"): "a scenario's draft leaves out pairs that touch",
+    ("nmm.model.collisions.pairs", "random_configurations"): "a scenario's draft leaves out pairs that touch",
+    ("nmm.model.collisions.pairs", "HULLS"): "a scenario's draft leaves out pairs that touch",
+    ("nmm.model.collisions.pairs", "query_shapes"): "a scenario's draft leaves out pairs that touch",
 }
 
 

@@ -9,7 +9,7 @@ from findings import of_code
 from urdf_parts import joint, link, robot, write
 
 import nmm
-from nmm.robots.loading.report import file_report
+from nmm.model.robots.loading.report import file_report
 
 PLACES = {"a": (0.3, 0.2), "b": (0.3, -0.2), "c": (-0.3, 0.2), "d": (-0.3, -0.2)}
 

@@ -11,9 +11,9 @@ from urdf_parts import joint, link, robot, write
 
 import nmm
 from nmm.cli.exit_status import status_of
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.wheel_rates import inputs_held_by
 from nmm.playback.rolling import Rolling
-from nmm.robots.robot import Robot
-from nmm.robots.wheel_rates import inputs_held_by
 
 Array = np.ndarray
 

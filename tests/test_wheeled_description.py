@@ -28,9 +28,9 @@ from wheeled_examples import (
 )
 
 from nmm.base.errors import NOTHING
-from nmm.platforms.wheeled.descriptions import CasterWheel, FixedWheel, Hitch, OmniWheel, SteeredWheel
-from nmm.platforms.wheeled.inputs import CommonSpeed, WeightedSpins, WheelSpeed, WheelSpin
-from nmm.platforms.wheeled.platform import WheeledPlatform
+from nmm.model.platforms.wheeled.descriptions import CasterWheel, FixedWheel, Hitch, OmniWheel, SteeredWheel
+from nmm.model.platforms.wheeled.inputs import CommonSpeed, WeightedSpins, WheelSpeed, WheelSpin
+from nmm.model.platforms.wheeled.platform import WheeledPlatform
 
 
 @pytest.mark.parametrize(

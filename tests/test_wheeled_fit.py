@@ -10,10 +10,10 @@ from numpy import pi
 from wheeled_examples import AXLE, trailer
 
 from nmm.base.errors import InputError
-from nmm.platforms.recognition import with_roles
-from nmm.platforms.wheel_layout import Layout, Pivot, RollingJoint
-from nmm.platforms.wheeled.descriptions import CasterWheel, Hitch, SteeredWheel
-from nmm.platforms.wheeled.platform import WheeledPlatform
+from nmm.model.platforms.recognition import with_roles
+from nmm.model.platforms.wheel_layout import Layout, Pivot, RollingJoint
+from nmm.model.platforms.wheeled.descriptions import CasterWheel, Hitch, SteeredWheel
+from nmm.model.platforms.wheeled.platform import WheeledPlatform
 
 
 def pivot(joint: str, x: float, y: float = 0.0, carrier: str = "theta") -> Pivot:

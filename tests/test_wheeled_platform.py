@@ -25,7 +25,7 @@ from wheeled_examples import (
     trailer,
 )
 
-from nmm.platforms import (
+from nmm.model.platforms import (
     Car,
     DifferentialDrive,
     FixedBase,
@@ -37,10 +37,10 @@ from nmm.platforms import (
     Trailer,
     Unicycle,
 )
-from nmm.platforms.wheeled.descriptions import CasterWheel, Hitch, OmniWheel, SteeredWheel
-from nmm.platforms.wheeled.inputs import WeightedSpins, WheelSpeed, WheelSpin
-from nmm.platforms.wheeled.platform import WheeledPlatform
-from nmm.robots.robot import Robot
+from nmm.model.platforms.wheeled.descriptions import CasterWheel, Hitch, OmniWheel, SteeredWheel
+from nmm.model.platforms.wheeled.inputs import WeightedSpins, WheelSpeed, WheelSpin
+from nmm.model.platforms.wheeled.platform import WheeledPlatform
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

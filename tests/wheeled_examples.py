@@ -10,7 +10,7 @@ import numpy as np
 from numpy import pi
 from numpy.typing import NDArray
 
-from nmm.platforms.wheeled.descriptions import (
+from nmm.model.platforms.wheeled.descriptions import (
     CasterWheel,
     FixedWheel,
     Hitch,
@@ -18,8 +18,8 @@ from nmm.platforms.wheeled.descriptions import (
     SteeredWheel,
     WheelDescription,
 )
-from nmm.platforms.wheeled.inputs import CommonSpeed, WeightedSpins, WheelSpeed, WheelSpin
-from nmm.platforms.wheeled.platform import WheeledPlatform
+from nmm.model.platforms.wheeled.inputs import CommonSpeed, WeightedSpins, WheelSpeed, WheelSpin
+from nmm.model.platforms.wheeled.platform import WheeledPlatform
 
 Array = NDArray[np.float64]
 Path = Callable[[float], Array]

@@ -1,4 +1,4 @@
-"""Names in signatures lead to the page of the public name: nmm.robots.robot.Robot is nmm.Robot."""
+"""Names in signatures lead to the page of the public name: nmm.model.robots.robot.Robot is nmm.Robot."""
 
 from typing import Any
 

@@ -6,7 +6,7 @@ from nmm.base.arrays import Array
 from nmm.base.kernels.compiled import kernel
 from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.functions.function import Function, Row, Stage
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 
 @kernel(FUNCTION)

@@ -98,16 +98,16 @@ NAMES = ("Jacobian",)
 
 PLATFORMS = Kinds(
     "platform",
-    unicycle="nmm.platforms.unicycle:Unicycle",
-    differential="nmm.platforms.unicycle:DifferentialDrive",
-    skid_steer="nmm.platforms.skid_steer:SkidSteer",
-    car="nmm.platforms.car:Car",
-    front_drive_car="nmm.platforms.car:FrontDriveCar",
-    tractor="nmm.platforms.tractor:Tractor",
-    omnidirectional="nmm.platforms.omnidirectional:Omnidirectional",
-    mecanum="nmm.platforms.omnidirectional:Mecanum",
-    fixed="nmm.platforms.omnidirectional:FixedBase",
-    wheeled="nmm.platforms.wheeled.platform:WheeledPlatform",
+    unicycle="nmm.model.platforms.unicycle:Unicycle",
+    differential="nmm.model.platforms.unicycle:DifferentialDrive",
+    skid_steer="nmm.model.platforms.skid_steer:SkidSteer",
+    car="nmm.model.platforms.car:Car",
+    front_drive_car="nmm.model.platforms.car:FrontDriveCar",
+    tractor="nmm.model.platforms.tractor:Tractor",
+    omnidirectional="nmm.model.platforms.omnidirectional:Omnidirectional",
+    mecanum="nmm.model.platforms.omnidirectional:Mecanum",
+    fixed="nmm.model.platforms.omnidirectional:FixedBase",
+    wheeled="nmm.model.platforms.wheeled.platform:WheeledPlatform",
 )
 TASKS = Kinds(
     "task",

@@ -16,8 +16,8 @@ from nmm.cli.output import WIDTH_OF_A_PIPE, show_table, show_text
 if TYPE_CHECKING:
     from nmm.base.arrays import Array
     from nmm.control.controller import Controller
-    from nmm.robots.robot import Robot
-    from nmm.robots.wheel import Wheel
+    from nmm.model.robots.robot import Robot
+    from nmm.model.robots.wheel import Wheel
 
 #: More frames than these, and those that need more than a line, are listed in a table.
 _FRAMES_IN_A_LINE = 30
@@ -55,7 +55,7 @@ def info(
     """
     from nmm.control.idle_inputs import inputs_without_effect
     from nmm.control.steering import Steering
-    from nmm.robots.loading import load
+    from nmm.model.robots.loading import load
 
     keywords, texts = loading.keywords(), arguments_of(arguments)
     given = None
@@ -109,7 +109,7 @@ def _of_scenario(name: str, robot: Robot | None, loading: Mapping[str, Any]) -> 
 
 
 def _show(robot: Robot, tasks: Sequence[tuple[str, int]]) -> None:
-    from nmm.robots.wheel_rates import wheel_rates
+    from nmm.model.robots.wheel_rates import wheel_rates
 
     show_text(f"{robot.name} ({robot.source}), {robot.platform.name} platform")
     show_text()
@@ -158,7 +158,7 @@ def _coordinates(robot: Robot) -> Iterator[list[str]]:
 
 
 def _inputs(robot: Robot) -> Iterator[list[str]]:
-    from nmm.robots.wheel_rates import inputs_held_by
+    from nmm.model.robots.wheel_rates import inputs_held_by
 
     held = inputs_held_by(robot, [wheel.joint for wheel in robot.wheels if isfinite(wheel.velocity)])
     for i, (name, unit, limit) in enumerate(zip(robot.u_names, robot.u_units, robot.u_limits, strict=True)):
@@ -172,7 +172,7 @@ def _arm(robot: Robot, joint: str) -> str:
 
 
 def _limit(value: float) -> str:
-    from nmm.robots.coordinates import UNLIMITED
+    from nmm.model.robots.coordinates import UNLIMITED
 
     return f"{value + 0.0:.4g}" if isfinite(value) and abs(value) < UNLIMITED else "-"  # no -0
 
@@ -191,7 +191,7 @@ def _wheel(wheel: Wheel, *, kept: bool) -> list[str]:
 
 
 def _show_loading(robot: Robot) -> None:
-    from nmm.robots.loading.provenance import PLATFORM_SOURCES, provenance_of
+    from nmm.model.robots.loading.provenance import PLATFORM_SOURCES, provenance_of
 
     made = provenance_of(robot)
     lines = [f"note: {note}" for note in robot.notes]

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from nmm.driving.setups import DriveSetup
     from nmm.functions.function import Function
     from nmm.functions.tasks import Task
-    from nmm.robots.motion import Motion
-    from nmm.robots.robot import Robot
+    from nmm.model.robots.motion import Motion
+    from nmm.model.robots.robot import Robot
     from nmm.runs.trajectory import Trajectory
     from nmm.scenario import Scenario
 

@@ -23,8 +23,8 @@ from nmm.cli.output import BAD_INPUT, OK, complain, readable, show_table, show_t
 
 if TYPE_CHECKING:
     from nmm.base.findings import Finding
-    from nmm.robots.loading.report import FileReport
-    from nmm.robots.robot import Robot
+    from nmm.model.robots.loading.report import FileReport
+    from nmm.model.robots.robot import Robot
 
 #: So many findings with one code, and pairs of links that touch, are shown.
 MOST_ALIKE = 10
@@ -52,8 +52,8 @@ def check(
     The lines of a xacro file's problems are those of the text that xacro makes of it. Of what is alike ten
     are shown. Exit status 2 when there are problems.
     """
-    from nmm.robots.loading.packages import package_file
-    from nmm.robots.loading.report import file_report
+    from nmm.model.robots.loading.packages import package_file
+    from nmm.model.robots.loading.report import file_report
 
     settings, keywords = arguments_of(arguments), loading.keywords()
     folders = keywords.pop("package_dirs")
@@ -102,7 +102,7 @@ def check(
 
 def _touching(robot: Robot) -> tuple[str, dict[tuple[str, str], float]]:
     """How many of the robot's links can touch each other, and which, with how often they do."""
-    from nmm.collisions.pairs import touching_links
+    from nmm.model.collisions.pairs import touching_links
 
     found = touching_links(robot)
     if not found.shapes:
@@ -165,7 +165,7 @@ def init(
     nmm init car_base --arm my_arm.urdf --at arm_mount
     nmm init my_arm.urdf --platform fixed
     """
-    from nmm.robots.loading.source import source_path
+    from nmm.model.robots.loading.source import source_path
     from nmm.scaffold import first_scenario
     from nmm.scaffold.draft import usual_file
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from nmm.control.controller import Controller
     from nmm.functions.function import Function
     from nmm.functions.tasks import Stack, Task
-    from nmm.robots.robot import Robot
+    from nmm.model.robots.robot import Robot
     from nmm.runs.trajectory import Trajectory
     from nmm.scenario import Scenario
 
@@ -128,7 +128,7 @@ def configuration_at(robot: Robot, q: Array, at: Sequence[str] | None, locked: M
 
 def coordinates_at(robot: Robot, at: Sequence[str] | None) -> dict[str, float]:
     """What `--at` says by coordinate, m and rad; posture=NAME, one of the SRDF's, says several."""
-    from nmm.robots.semantics import POSTURE
+    from nmm.model.robots.semantics import POSTURE
 
     named = [text for text in at or () if text.partition("=")[0].strip() == POSTURE not in robot.q_names]
     numbers = [text for text in at or () if text not in named]
@@ -168,7 +168,7 @@ def opened(
 ) -> tuple[Trajectory | None, Scenario | None, Robot]:
     """The run, the scenario and the robot of SOURCE; run and scenario where it is one."""
     from nmm.base.bundled import bundled_robots, bundled_scenarios
-    from nmm.robots.loading import load
+    from nmm.model.robots.loading import load
     from nmm.runs.trajectory import Trajectory
     from nmm.scenario import Scenario
     from nmm.scenario.keys import older_names

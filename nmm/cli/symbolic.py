@@ -18,7 +18,7 @@ from nmm.cli.singularity_report import header, row_names
 if TYPE_CHECKING:
     from nmm.analysis.formulas import Claim, SymbolicAnalysis
     from nmm.cli.subjects import Studied
-    from nmm.robots.robot import Robot
+    from nmm.model.robots.robot import Robot
 
 #: Reasons for more minors than these are not given.
 MANY_REASONS = 12
@@ -234,7 +234,7 @@ def _angle(condition: Any) -> tuple[str, Formula] | None:
 
 def _may_be_zero(robot: Robot, argument: str) -> bool:
     """Whether the robot's file takes 0 for an argument: an arm without an upper arm is none."""
-    from nmm.robots.loading import load
+    from nmm.model.robots.loading import load
 
     try:
         load(robot.source, arguments={**robot.arguments, argument: "0"})

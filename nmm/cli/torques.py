@@ -15,7 +15,7 @@ from nmm.cli.options import SetOption, flag, option, out_option, values_of
 from nmm.cli.output import OK, progress, show_table, show_text, warn
 
 if TYPE_CHECKING:
-    from nmm.dynamics.torques import Torques
+    from nmm.model.dynamics.torques import Torques
 
 
 @command

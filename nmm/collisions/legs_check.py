@@ -19,7 +19,7 @@ from nmm.base.kernels.kinematics import Joints, axes, compose, moved, place_join
 from nmm.base.kernels.linear_algebra import copied, dot, norm
 from nmm.base.kernels.record_layout import IntegerCell, IntegerVector, Matrix, Vector, views
 from nmm.base.kernels.velocity_map import place_mimic_joints
-from nmm.collisions.separation import ConvexShapes, extreme, separation
+from nmm.model.collisions.separation import ConvexShapes, extreme, separation
 
 #: Pairs within this beyond their distance count as too near, m: else motions along a wall take looks without
 #: end.

@@ -11,11 +11,11 @@ from nmm.base.arrays import Array, Integers
 from nmm.base.kernels.compiled import checked_by_caller, compiled
 from nmm.base.kernels.record_layout import BLOCKS, Blocks, Memory, views
 from nmm.collisions.legs_check import MARGIN, MovedShapes, first_blocked, too_near
-from nmm.collisions.queries import Queries
-from nmm.collisions.scene import Scene
-from nmm.collisions.separation import ConvexShapes
-from nmm.robots.joint_table import as_row
-from nmm.robots.robot import Robot
+from nmm.model.collisions.queries import Queries
+from nmm.model.collisions.scene import Scene
+from nmm.model.collisions.separation import ConvexShapes
+from nmm.model.robots.joint_table import as_row
+from nmm.model.robots.robot import Robot
 
 #: The direction that separates a pair before the first look.
 UP = (0.0, 0.0, 1.0)

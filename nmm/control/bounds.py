@@ -27,9 +27,9 @@ from nmm.base.kernels.record_layout import (
     SampledVector,
     Vector,
 )
-from nmm.collisions.rows import Rows
+from nmm.model.collisions.rows import Rows
+from nmm.model.robots.wheel_rates import rolling
 from nmm.resolvers.problem_arrays import LOWER, UPPER, ProblemArrays
-from nmm.robots.wheel_rates import rolling
 
 #: `LimitNumbers.mode`: a step at a sample, at an integrator's stage after it, or without limits.
 SAMPLE, STAGE, OFF = 0, 1, 2
@@ -47,7 +47,7 @@ class LimitNumbers(NamedTuple):
     slowest, fastest (m,) : of the inputs; falling, rising (m,) : how fast they may fall and rise, per second
     coordinate (m,) : the coordinate whose rate an input is, -1 for none; low, high (m,) : its limits
     recovery () : speed of the return from beyond a limit, m/s or rad/s
-    wheels (w, 9) : see `nmm.robots.wheel_rates`; spin (w,) : the wheels' largest rates, rad/s
+    wheels (w, 9) : see `nmm.model.robots.wheel_rates`; spin (w,) : the wheels' largest rates, rad/s
     rows (f,) : of the program; row_low, row_high (f,) : limits of these values
     braking (f,) : deceleration of these values; NaN for a share of the inputs' accelerations
     elapsed () : time since the previous inputs, s; NaN for the problem's dt

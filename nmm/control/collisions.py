@@ -12,10 +12,10 @@ import numpy as np
 
 from nmm.base.arrays import counted, positive, scalar
 from nmm.base.errors import InputError, expect_kind, expect_known
-from nmm.collisions.obstacle import Obstacle
-from nmm.collisions.pairs import CAPSULES, HULLS
-from nmm.collisions.scene import Scene, set_up
-from nmm.robots.robot import Robot
+from nmm.model.collisions.obstacle import Obstacle
+from nmm.model.collisions.pairs import CAPSULES, HULLS
+from nmm.model.collisions.scene import Scene, set_up
+from nmm.model.robots.robot import Robot
 
 #: Pairs within the distance to keep plus this are considered, m.
 BAND = 0.2

@@ -15,7 +15,7 @@ from nmm.control.task_rows import error_row
 from nmm.functions.program import LaidOut, run_program
 from nmm.functions.tasks.conditions import After, Between, Condition
 from nmm.functions.tasks.task import Task
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 #: Times that differ by less are equal, s.
 SAME = 1e-9

@@ -32,8 +32,8 @@ from nmm.functions.function import Row
 from nmm.functions.objectives.base import Objective
 from nmm.functions.program import PINOCCHIO, nothing
 from nmm.functions.tasks.task import Stack, Task
+from nmm.model.robots.robot import Robot
 from nmm.resolvers.base import Resolver
-from nmm.robots.robot import Robot
 
 FLOAT64 = np.dtype(np.float64)
 

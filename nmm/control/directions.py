@@ -14,10 +14,10 @@ from nmm.base.text_format import signed_sum
 from nmm.functions.function import Function, Row, row_scales
 from nmm.functions.tasks.pose import Orientation, Pose
 from nmm.functions.tasks.task import Stack
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 from nmm.resolvers.answer import Status
 from nmm.resolvers.problem_arrays import ProblemArrays
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
 
 #: Singular values this small beside the largest are zero.
 TOLERANCE = 1e-10

@@ -22,13 +22,13 @@ from nmm.base.kernels.record_layout import (
     views,
 )
 from nmm.base.kernels.velocity_map import to_coordinates, to_inputs
-from nmm.collisions.rows import Rows
 from nmm.control.bounds import SAMPLE, Clearance, LimitNumbers, gathers_speed
 from nmm.control.period_monitor import PeriodNumbers
 from nmm.control.retreat import RetreatNumbers, stalls
 from nmm.control.steering import SteeringNumbers, steer
 from nmm.control.step_records import SecondOrder, TaskRows
 from nmm.functions.program import BESIDE, Buffers, LaidOut, run_program
+from nmm.model.collisions.rows import Rows
 from nmm.resolvers.answer import NOT_FINITE, RELAXED, SINGULAR_J, SOLVED, AnswerArrays
 from nmm.resolvers.base import call_resolver
 from nmm.resolvers.limit_check import keep_limits

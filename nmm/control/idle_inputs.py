@@ -11,7 +11,7 @@ from nmm.base.arrays import Array
 from nmm.control.step_solver import StepSolver
 from nmm.functions.objectives.base import Product
 from nmm.functions.program import evaluate
-from nmm.robots.configuration import Configuration
+from nmm.model.robots.configuration import Configuration
 
 #: Number of configurations: in a single one a column may be zero by chance.
 CONFIGURATIONS = 8

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 from nmm.base.arrays import Array
 from nmm.base.errors import RunError, expect_known
 from nmm.base.kernels.compiled import allocating
-from nmm.robots.robot import Robot
-from nmm.robots.zero_order_hold import HeldInputs
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.zero_order_hold import HeldInputs
 
 Velocity = Callable[[float, Array], Array]
 #: The inputs (m,) at a stage, t and q (n,).

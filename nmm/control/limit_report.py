@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nmm.collisions.scene import Scene
 from nmm.control.equations import ControlStep
 from nmm.control.limits import LimitsOn
 from nmm.functions.program import Program
+from nmm.model.collisions.scene import Scene
+from nmm.model.robots.robot import Robot
 from nmm.resolvers.problem_arrays import ProblemArrays
-from nmm.robots.robot import Robot
 
 
 class LimitReport:

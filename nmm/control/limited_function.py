@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from nmm.base.arrays import counted, infinite, positive
 from nmm.base.errors import InputError, expect, expect_kind, few
 from nmm.functions.function import Function
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 
 class Kept(NamedTuple):

@@ -12,9 +12,9 @@ from nmm.base.errors import InputError, expect_kind, expect_known, one_or_severa
 from nmm.control.bounds import SAMPLE, LimitNumbers
 from nmm.control.limited_function import Bound, Kept
 from nmm.functions.tasks.linear_coordinates import LinearCoordinates
-from nmm.robots.coordinates import UNLIMITED
-from nmm.robots.robot import Robot
-from nmm.robots.wheel_rates import wheel_rates
+from nmm.model.robots.coordinates import UNLIMITED
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.wheel_rates import wheel_rates
 
 #: A number for both signs, or [lower, upper].
 Range: TypeAlias = float | Sequence[float]
@@ -89,7 +89,7 @@ class LimitsOn:
     accelerations (m,) : the size of the smaller of both
     bounded : names of coordinates with limits
     functions : whose values are limited; braking (f,) : of their components
-    wheels (w, 9), spin (w,) : rows of `nmm.robots.wheel_rates`, and the wheels' largest rates, the first of
+    wheels (w, 9), spin (w,) : rows of `nmm.model.robots.wheel_rates`, and the wheels' largest rates, the first of
         `rows`, rad/s
     row_limits, rows : the limits that are rows on the inputs, and their names: first wheels, then functions'
         components

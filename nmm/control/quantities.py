@@ -17,7 +17,7 @@ import numpy as np
 from nmm.base.arrays import Array, Integers
 from nmm.base.errors import expect_known
 from nmm.base.kernels.spectra import spectra
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,10 @@ import numpy as np
 
 from nmm.base.arrays import Array
 from nmm.base.kernels.compiled import checked_by_caller
-from nmm.collisions.scene import Scene
-from nmm.collisions.swept_check import Short, SweptCheck
 from nmm.control.equations import DRIVE, ControlStep, drive_inputs
 from nmm.functions.program import BESIDE, Program
+from nmm.model.collisions.scene import Scene
+from nmm.model.collisions.swept_check import Short, SweptCheck
 from nmm.resolvers.answer import RELAXED, Status
 from nmm.resolvers.limit_check import LEFT
 

@@ -17,7 +17,7 @@ from nmm.control.task_rows import task_functions
 from nmm.functions.program import COMPILED, Program
 from nmm.functions.tasks.conditions import After, Between, Condition, While
 from nmm.functions.tasks.task import Stack
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 
 class Event(NamedTuple):

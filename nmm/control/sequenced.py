@@ -22,10 +22,10 @@ from nmm.functions.objectives.base import Objective
 from nmm.functions.program import PINOCCHIO
 from nmm.functions.references import Constant
 from nmm.functions.tasks.task import Stack, Task
+from nmm.model.robots.robot import Robot
 from nmm.resolvers.base import Resolver
 from nmm.resolvers.callable_resolver import CallableResolver
 from nmm.resolvers.problem import Problem
-from nmm.robots.robot import Robot
 
 
 class SequencedController(Controller):

@@ -6,7 +6,7 @@ from nmm.base.arrays import Array
 from nmm.base.findings import Finding
 from nmm.control.step_solver import StepSolver
 from nmm.functions.program import evaluate
-from nmm.robots.configuration import Configuration
+from nmm.model.robots.configuration import Configuration
 
 #: Singular values below this share of the largest are zero.
 ZERO = 1e-9

@@ -24,11 +24,11 @@ from nmm.base.kernels.linear_algebra import dot
 from nmm.base.kernels.record_layout import Cell, IntegerCell, IntegerVector, Vector
 from nmm.functions.pursuit import Pursuit
 from nmm.functions.tasks.task import Task
-from nmm.platforms.base import Platform
-from nmm.platforms.steering import SteeringPivot
+from nmm.model.platforms.base import Platform
+from nmm.model.platforms.steering import SteeringPivot
+from nmm.model.robots.reach import first_tip, reach
+from nmm.model.robots.robot import Robot
 from nmm.resolvers.problem_arrays import ProblemArrays
-from nmm.robots.reach import first_tip, reach
-from nmm.robots.robot import Robot
 
 
 class SteeringNumbers(NamedTuple):

@@ -10,8 +10,8 @@ import numpy as np
 from nmm.base.arrays import Array, Integers
 from nmm.base.errors import expect_known
 from nmm.control.quantities import QUANTITIES, Record
+from nmm.model.robots.robot import Robot
 from nmm.resolvers.answer import Status
-from nmm.robots.robot import Robot
 
 
 @dataclass(frozen=True, eq=False)

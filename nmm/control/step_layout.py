@@ -8,7 +8,6 @@ from nmm.base.arrays import positive
 from nmm.base.errors import InputError, expect_kind, expect_known
 from nmm.base.kernels.parallel_compile import compile_in_parallel
 from nmm.base.kernels.record_layout import views
-from nmm.collisions.rows import no_rows
 from nmm.control.acceleration import accelerate, write_next_limits
 from nmm.control.bounded_step import write_clearance, write_limits
 from nmm.control.bounds import Clearance
@@ -26,12 +25,13 @@ from nmm.functions.function import Function, row_scales
 from nmm.functions.objectives.base import Objective
 from nmm.functions.program import BESIDE, COMPILED, PINOCCHIO, Buffers, Program
 from nmm.functions.tasks.task import Stack
+from nmm.model.collisions.rows import no_rows
+from nmm.model.robots.robot import Robot
 from nmm.resolvers.answer import unanswered
 from nmm.resolvers.base import Resolver, State
 from nmm.resolvers.problem import Dimensions, Problem
 from nmm.resolvers.problem_arrays import LOWER, UPPER
 from nmm.resolvers.saturation import limit
-from nmm.robots.robot import Robot
 
 
 class Given(NamedTuple):

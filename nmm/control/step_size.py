@@ -35,9 +35,9 @@ from nmm.base.kernels.record_layout import (
 from nmm.control.equations import ControlStep, resolve
 from nmm.functions.function import Function
 from nmm.functions.program import BESIDE, COMPILED, Buffers, LaidOut, Program, run_program
+from nmm.model.robots.robot import Robot
 from nmm.resolvers.answer import SINGULAR_J
 from nmm.resolvers.base import Resolver
-from nmm.robots.robot import Robot
 
 #: c: on a parabola the step is then at most 1.5 times that to the minimum.
 DECREASE = 0.25

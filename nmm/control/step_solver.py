@@ -18,7 +18,6 @@ from nmm.base.arrays import Array, positive, scalar
 from nmm.base.errors import InputError, RunError, SingularError
 from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.record_layout import Blocks
-from nmm.collisions.scene import Scene
 from nmm.control.acceleration import (
     AHEAD,
     BEHIND,
@@ -46,6 +45,7 @@ from nmm.control.step_size import StepSize
 from nmm.control.stepping import write_errors
 from nmm.functions.function import Row
 from nmm.functions.program import nothing
+from nmm.model.collisions.scene import Scene
 from nmm.resolvers.answer import Status
 from nmm.resolvers.base import Resolver, State
 

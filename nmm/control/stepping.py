@@ -16,8 +16,8 @@ from nmm.control.bounds import SAMPLE, STAGE
 from nmm.control.equations import ControlStep, call_step, write_equation
 from nmm.control.integrators import MIDPOINT, Integrator, RungeKutta, WithMimicJoints, ZeroOrderHold
 from nmm.functions.program import BESIDE, LaidOut, run_program
+from nmm.model.robots.zero_order_hold import Inputs, hold_rates
 from nmm.resolvers.answer import SINGULAR_J, SOLVED
-from nmm.robots.zero_order_hold import Inputs, hold_rates
 
 
 class Tableau(NamedTuple):

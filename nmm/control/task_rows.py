@@ -10,7 +10,7 @@ from nmm.base.arrays import Array, Integers
 from nmm.control.equations import PLAIN, WRAPPED, TaskRows
 from nmm.functions.function import Function, Row
 from nmm.functions.tasks.task import Comparison, Stack, Task
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 
 def task_functions(stack: Stack) -> list[Function]:

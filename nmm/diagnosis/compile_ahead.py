@@ -6,7 +6,7 @@ from nmm.control.equations import step
 from nmm.diagnosis.assessment import LINEARISE, linearise
 from nmm.diagnosis.error_bound import write_step_errors
 from nmm.functions.program import PLACE, place
-from nmm.robots.frame_path import follow_frame
+from nmm.model.robots.frame_path import follow_frame
 from nmm.runs.compiled_loop import ADVANCE_SAMPLES, advance_samples
 
 

@@ -19,7 +19,7 @@ from nmm.diagnosis import reasons
 from nmm.diagnosis.assessment import Assessment, Instability, assess
 from nmm.diagnosis.error_bound import Departure, Samples
 from nmm.diagnosis.jumps import chattering, crossings, moving_otherwise
-from nmm.robots.wheel_slip import sideways_speeds
+from nmm.model.robots.wheel_slip import sideways_speeds
 from nmm.runs.leg import Leg
 from nmm.runs.recorded_run import record_run, sample_times
 from nmm.runs.recording import Recorder

@@ -8,12 +8,12 @@ import numpy as np
 from nmm.base.arrays import Array
 from nmm.base.findings import Finding
 from nmm.base.text_format import listed
-from nmm.collisions.scene import Scene
 from nmm.control.controller import Controller
 from nmm.control.limits import LimitsOn
 from nmm.control.safety_filter import Counts
-from nmm.robots.robot import Robot
-from nmm.robots.wheel_rates import turning_wheels
+from nmm.model.collisions.scene import Scene
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.wheel_rates import turning_wheels
 from nmm.runs.clearance import ROUNDING, Swept
 from nmm.runs.margins import standing
 from nmm.runs.recording import Recorder

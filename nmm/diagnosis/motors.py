@@ -11,7 +11,7 @@ from nmm.base.errors import InputError
 from nmm.base.findings import Finding
 
 if TYPE_CHECKING:
-    from nmm.dynamics.torques import Torques
+    from nmm.model.dynamics.torques import Torques
     from nmm.runs.trajectory import Trajectory
 
 #: Longer runs take seconds: of these `nmm torques` tells when asked.

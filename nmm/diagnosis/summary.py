@@ -9,11 +9,11 @@ import numpy as np
 
 from nmm.base.findings import Finding
 from nmm.base.findings.run import MOTORS
-from nmm.collisions.obstacle import obstacle_as_json
 from nmm.control.quantities import Number, placed
 from nmm.diagnosis.limits import fast_wheels
 from nmm.diagnosis.motors import motor_findings
-from nmm.robots.wheel_rates import inputs_held_by
+from nmm.model.collisions.obstacle import obstacle_as_json
+from nmm.model.robots.wheel_rates import inputs_held_by
 from nmm.runs.margins import at_limits, nearest_limits
 
 if TYPE_CHECKING:

@@ -20,14 +20,14 @@ from nmm.driving.setups import led_by
 from nmm.functions.references import Constant
 from nmm.functions.references.live_target import LiveTarget
 from nmm.functions.tasks.task import Task
+from nmm.model.robots.frame_path import FramePath
+from nmm.model.robots.motion import Motion
 from nmm.plans.plan import Plan
 from nmm.plans.planned import plan
 from nmm.playback.drawing import Command, packed
 from nmm.playback.keyframes import ghost_samples
 from nmm.playback.shapes import DrawnRobot
 from nmm.resolvers import CallableResolver, ProjectedGradient
-from nmm.robots.frame_path import FramePath
-from nmm.robots.motion import Motion
 
 #: How long a plan is looked for, s, and how much more than the controller it keeps, m.
 SECONDS, MARGIN = 5.0, 0.05

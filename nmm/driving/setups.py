@@ -21,10 +21,10 @@ from nmm.functions.function import Function
 from nmm.functions.program import evaluate
 from nmm.functions.references.live_target import LiveTarget
 from nmm.functions.tasks.task import Stack, Task
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.surroundings import NO_SURROUNDINGS, Surroundings
 from nmm.resolvers.base import Resolver
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
-from nmm.robots.surroundings import NO_SURROUNDINGS, Surroundings
 from nmm.scenario import Scenario
 from nmm.scenario.resolvers import RESOLVER_PARTS
 

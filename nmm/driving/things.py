@@ -14,8 +14,8 @@ from nmm.functions.function import Function, Sight
 from nmm.functions.program import evaluate
 from nmm.functions.references.live_target import Displaced, LiveTarget
 from nmm.functions.tasks.task import Stack
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 from nmm.runs.seen import same_point
 
 

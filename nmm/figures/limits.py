@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from nmm.base import resolver_style
 from nmm.figures import style
-from nmm.robots.wheel_rates import wheel_rates
+from nmm.model.robots.wheel_rates import wheel_rates
 from nmm.runs.trajectory import Trajectory
 
 #: A limit counts as near within this share of its range.

@@ -18,8 +18,8 @@ from nmm.figures.seen_points import SeenPoints, few
 from nmm.figures.silhouette import Ink, Pose, Silhouette, hull, outline_points
 from nmm.figures.time_labels import SIZE, Ground, Place, Subject, places
 from nmm.figures.views import ABOVE, View, Viewed, page, upright
+from nmm.model.robots.frame_path import FramePath
 from nmm.playback.placements import base_position
-from nmm.robots.frame_path import FramePath
 from nmm.runs.trajectory import Trajectory
 
 #: Size of the marks at the path's ends, pt.

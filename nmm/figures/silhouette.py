@@ -14,12 +14,12 @@ from matplotlib.collections import Collection, LineCollection, PolyCollection
 
 from nmm.base.arrays import Array
 from nmm.figures.views import ABOVE, View
+from nmm.model.robots.loading.joint_kinds import axis
+from nmm.model.robots.meshes import read_meshes
+from nmm.model.robots.robot import Robot
 from nmm.playback.extent import corners
 from nmm.playback.placements import Placements, joint_screw
 from nmm.playback.rolling import Rolling
-from nmm.robots.loading.joint_kinds import axis
-from nmm.robots.meshes import read_meshes
-from nmm.robots.robot import Robot
 
 Color: TypeAlias = str | tuple[float, float, float]
 #: A joint that is not farther beside its link's axis than this stands on a column, m.

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from nmm.base import resolver_style
-from nmm.dynamics.torques import Torques
 from nmm.figures import style
+from nmm.model.dynamics.torques import Torques
 
 
 def torques(found: Torques, *, width: float = style.PAGE) -> Figure:

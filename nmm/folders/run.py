@@ -13,18 +13,23 @@ import yaml
 
 from nmm.base.errors import InputError, RobotError, expect
 from nmm.base.figure_options import Drawn, drawn_as
-from nmm.collisions.obstacle import obstacle_as_json, obstacle_from_json, obstacle_places, shape_from_json
 from nmm.control.quantities import placed, saved
 from nmm.diagnosis.summary import FORMAT
 from nmm.folders.whole import FolderKind, replaced_folder, steady
+from nmm.model.collisions.obstacle import (
+    obstacle_as_json,
+    obstacle_from_json,
+    obstacle_places,
+    shape_from_json,
+)
 from nmm.runs.components import components
 from nmm.runs.residuals import Residuals
 
 if TYPE_CHECKING:
     from nmm.base.ellipsoid_options import Wanted
-    from nmm.collisions.obstacle import Obstacle
     from nmm.folders.schema import ToldObstacle, ToldRun
-    from nmm.robots.robot import Robot
+    from nmm.model.collisions.obstacle import Obstacle
+    from nmm.model.robots.robot import Robot
     from nmm.runs.seen import RunCamera
     from nmm.runs.trajectory import Trajectory
 #: More samples take seconds to write, which is logged.
@@ -90,7 +95,7 @@ def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
 def _loaded(folder: Path, robot: Robot | None) -> Trajectory:
     from nmm.control.sequence import Event
     from nmm.folders.schema import ToldRun, check_arrays, read_arrays, read_checked
-    from nmm.robots.loading import load as load_robot
+    from nmm.model.robots.loading import load as load_robot
     from nmm.runs.trajectory import Trajectory
     from nmm.runs.verdict import verdict_of
     from nmm.scenario import Scenario

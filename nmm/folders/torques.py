@@ -13,7 +13,7 @@ from nmm.base.figure_options import PLAIN, FigureOptions
 from nmm.folders.whole import FolderKind, replaced_folder
 
 if TYPE_CHECKING:
-    from nmm.dynamics.torques import Torques
+    from nmm.model.dynamics.torques import Torques
 
 is_torques = FolderKind("nmm torques 1")
 

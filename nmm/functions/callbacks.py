@@ -14,8 +14,8 @@ from nmm.base.kernels.compiled import kernel
 from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.base.text_format import listed
 from nmm.functions.function import Callback, Evaluation, Function, Row, Stage
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 
 #: Step of the central differences: the cube root of the machine's precision balances truncation and rounding
 #: where the values change over distances near 1. It does not grow with t or q: nor does a sine's period.

@@ -19,9 +19,9 @@ from nmm.base.findings import Finding
 from nmm.base.kernels.compiled import Kernel, clear, kernel
 from nmm.base.kernels.linear_algebra import copied
 from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
-from nmm.robots.configuration import Configuration
-from nmm.robots.motion import NORMALISED
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.motion import NORMALISED
+from nmm.model.robots.robot import Robot
 
 
 class Row(NamedTuple):

@@ -28,9 +28,9 @@ from nmm.base.kernels.record_layout import (
 )
 from nmm.base.kernels.records import At, Frames, Rows, call_function
 from nmm.functions.function import Callback, Evaluation, Function, Renewal, Stage
-from nmm.robots.configuration import Configuration, kinematics_updater
-from nmm.robots.joint_table import frame_table
-from nmm.robots.robot import CENTER_OF_MASS, Robot
+from nmm.model.robots.configuration import Configuration, kinematics_updater
+from nmm.model.robots.joint_table import frame_table
+from nmm.model.robots.robot import CENTER_OF_MASS, Robot
 
 
 class Buffers(NamedTuple):

@@ -10,8 +10,8 @@ from nmm.base.arrays import Array
 from nmm.base.kernels.compiled import kernel
 from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.functions.function import Function, Row, Stage
-from nmm.platforms.steering import SteeredAxle
-from nmm.robots.robot import Robot
+from nmm.model.platforms.steering import SteeredAxle
+from nmm.model.robots.robot import Robot
 
 #: Numbers: the axle's x, y, heading, the length that keeps the azimuth's slope finite; then those of a pivot.
 AXLE, PIVOT = 4, 6

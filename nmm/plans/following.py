@@ -17,8 +17,8 @@ from nmm.base.kernels.compiled import checked_by_caller, compiled, kernel, scrat
 from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.control.goal import Goal, error_sizes, norms, unit_codes
 from nmm.functions.function import Function, Renewal, Row, Shown, Stage
-from nmm.robots.reach import first_tip
-from nmm.robots.robot import Robot
+from nmm.model.robots.reach import first_tip
+from nmm.model.robots.robot import Robot
 
 #: Between two knots of a table pass at most so many s.
 KNOT = 0.02

@@ -22,7 +22,7 @@ from nmm.control.goal import ANOTHER, Goal, norms, unit_codes
 from nmm.functions.program import BESIDE, COMPILED, LaidOut, Program, run_program
 from nmm.functions.tasks.linear_coordinates import Posture
 from nmm.functions.tasks.task import Comparison, Task
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 #: A configuration, coordinates by name, a task with a target that stands, or several of these.
 Wanted: TypeAlias = (

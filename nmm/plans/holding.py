@@ -24,11 +24,11 @@ from nmm.control.goal import Goal, norms, unit_codes
 from nmm.functions.program import BESIDE, evaluate
 from nmm.functions.tasks.pose import Pose
 from nmm.functions.tasks.task import Task
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 from nmm.plans.goals import STEPS, Newton, TaskError, newton_step
 from nmm.plans.tree import PLACE, Trees
 from nmm.plans.ways import leg_time
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
 
 #: Where what is held is off by no more, it is kept: m and rad.
 EXACT = 1e-10

@@ -13,11 +13,13 @@ from nmm.base.findings import Finding
 from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.record_layout import Memory, views
 from nmm.collisions.motion_check import MotionCheck
-from nmm.collisions.obstacle import shifts
 from nmm.control.collisions import Collisions
 from nmm.control.goal import Goal, error_sizes
 from nmm.control.limits import Limits
 from nmm.functions.tasks.task import Task
+from nmm.model.collisions.obstacle import shifts
+from nmm.model.robots.joint_table import as_row
+from nmm.model.robots.robot import Robot
 from nmm.plans.following import differences
 from nmm.plans.goals import TaskError, goal_task
 from nmm.plans.interior import SHOOT, shoot
@@ -26,8 +28,6 @@ from nmm.plans.problem import END, MARGIN, largest_inputs, shooting_problem
 from nmm.plans.recorded import recorded
 from nmm.plans.samples import SampledMotion, Samples
 from nmm.plans.shooting import LOOK, Shooting, first_blocked_sample
-from nmm.robots.joint_table import as_row
-from nmm.robots.robot import Robot
 from nmm.runs.trajectory import Outcome, Trajectory
 from nmm.runs.verdict import Verdict
 

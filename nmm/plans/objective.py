@@ -8,8 +8,8 @@ from nmm.base.arrays import Array
 from nmm.base.errors import InputError, expect_kind
 from nmm.functions.objectives.base import Objective
 from nmm.functions.program import COMPILED, Program, run_program
+from nmm.model.robots.robot import Robot
 from nmm.plans.shooting import Shooting
-from nmm.robots.robot import Robot
 
 #: Between the gradients whose difference is the curvature, m and rad.
 APART = 1e-5

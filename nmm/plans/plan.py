@@ -11,18 +11,18 @@ from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, positive
 from nmm.base.errors import InputError
-from nmm.collisions.scene import Scene
 from nmm.control.collisions import Collisions
 from nmm.control.goal import Goal
 from nmm.control.limits import Limits, LimitsOn
 from nmm.functions.objectives.base import Objective
 from nmm.functions.tasks.task import Task
+from nmm.model.collisions.scene import Scene
+from nmm.model.robots.robot import Robot
 from nmm.plans.following import FromPlan
 from nmm.plans.goals import Wanted, goal_task
 from nmm.plans.objective import SampleCosts
 from nmm.plans.recorded import recorded
 from nmm.plans.samples import SampledMotion
-from nmm.robots.robot import Robot
 from nmm.runs.trajectory import Trajectory
 
 

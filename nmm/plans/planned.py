@@ -13,13 +13,15 @@ from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, counted, positive, scalar
 from nmm.base.errors import InputError, NmmError, RunError, expect_kind, few
-from nmm.collisions.obstacle import Obstacle
-from nmm.collisions.scene import Scene
 from nmm.control.collisions import Collisions
 from nmm.control.goal import Goal
 from nmm.control.limits import Limits
 from nmm.functions.objectives.base import Objective
 from nmm.functions.tasks.task import Task
+from nmm.model.collisions.obstacle import Obstacle
+from nmm.model.collisions.scene import Scene
+from nmm.model.platforms.tractor import Tractor
+from nmm.model.robots.robot import Robot
 from nmm.plans.goals import Wanted, alternatives
 from nmm.plans.held_motion import HeldTiming
 from nmm.plans.held_search import HeldWays, refuse_beside_hold
@@ -32,8 +34,6 @@ from nmm.plans.smoothing import Smoothing
 from nmm.plans.timing import TimedLegs, timed
 from nmm.plans.towing import Towing
 from nmm.plans.waiting import LONG, waited
-from nmm.platforms.tractor import Tractor
-from nmm.robots.robot import Robot
 
 #: Ways that are tried among obstacles that move, and how often each but the first is shortened.
 WAYS, SHORTEN = 8, 50

@@ -10,10 +10,10 @@ import numpy as np
 from nmm.base.arrays import Array
 from nmm.collisions.motion_check import MotionCheck
 from nmm.control.limits import LimitsOn
+from nmm.model.platforms.tractor import Tractor
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.zero_order_hold import inputs_of
 from nmm.plans.shooting import Shooting
-from nmm.platforms.tractor import Tractor
-from nmm.robots.robot import Robot
-from nmm.robots.zero_order_hold import inputs_of
 
 #: Samples' ends keep this much more than the distance, m.
 MARGIN = 0.005

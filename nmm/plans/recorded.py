@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from nmm.base.arrays import Array
-from nmm.collisions.scene import Scene
 from nmm.control.limits import LimitsOn
 from nmm.functions.tasks.task import Task
+from nmm.model.collisions.scene import Scene
+from nmm.model.robots.frame_path import FramePath
+from nmm.model.robots.reach import first_tip
+from nmm.model.robots.robot import Robot
 from nmm.plans.goals import TaskError
-from nmm.robots.frame_path import FramePath
-from nmm.robots.reach import first_tip
-from nmm.robots.robot import Robot
 from nmm.runs.clearance import swept
 from nmm.runs.margins import margin, shares, standing
 from nmm.runs.seen import SeenPoints

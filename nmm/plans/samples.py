@@ -17,7 +17,7 @@ from nmm.base.kernels.compiled import call_platform, checked_by_caller, clear, c
 from nmm.base.kernels.linear_algebra import copied
 from nmm.base.kernels.record_layout import BLOCKS, IntegerCell, Matrix, Memory, Vector, views
 from nmm.base.kernels.velocity_map import place_mimic_joints, to_coordinates
-from nmm.robots.zero_order_hold import Inputs
+from nmm.model.robots.zero_order_hold import Inputs
 
 #: The method's times, slopes' shares of each stage, and of the step.
 TIMES = np.array([0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0 / 3.0, 0.5, 0.5, 1.0])

@@ -18,6 +18,7 @@ from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.record_layout import views
 from nmm.collisions.legs_check import MARGIN
 from nmm.collisions.motion_check import MotionCheck
+from nmm.model.robots.robot import Robot
 from nmm.plans import tree
 from nmm.plans.effort import efforts_of
 from nmm.plans.goals import GoalPostures, Wanted, alternatives, nothing_found
@@ -27,7 +28,6 @@ from nmm.plans.plan import Asked
 from nmm.plans.search_space import drawn_within, leg_speeds, pause_between, usual_speeds
 from nmm.plans.tree import PLACE, Trees
 from nmm.plans.ways import LEGS, ways_of
-from nmm.robots.robot import Robot
 
 #: Room for configurations in each tree, and rounds of a search between two looks at the clock.
 ROOM, ROUNDS = 20_000, 200

@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from nmm.base.arrays import Array
-from nmm.collisions.obstacle import Obstacle
-from nmm.collisions.shapes import HalfSpace
 from nmm.control.limits import LimitsOn
 from nmm.functions.tasks.task import Task
+from nmm.model.collisions.obstacle import Obstacle
+from nmm.model.collisions.shapes import HalfSpace
+from nmm.model.robots.robot import Robot
 from nmm.plans.goals import Wanted, alternatives
-from nmm.robots.robot import Robot
 
 #: Speeds where inputs have no limits, m/s and rad/s; the stop between legs where accelerations have none, s.
 USUAL, PAUSE = 1.0, 0.2

@@ -30,9 +30,9 @@ from nmm.collisions.legs_check import (
     placed_bound,
     write_approach,
 )
+from nmm.model.robots.wheel_rates import rolling
+from nmm.model.robots.zero_order_hold import Inputs
 from nmm.plans.samples import flow, write_fastest
-from nmm.robots.wheel_rates import rolling
-from nmm.robots.zero_order_hold import Inputs
 
 #: Distances are looked at within this beyond those to keep, m.
 NEAR = 0.08
@@ -45,7 +45,7 @@ class Shooting(NamedTuple):
 
     inputs : what they move; step (), substeps () : of each sample, s
     column (B,), sign (B,), offset (B,) : bounds offset + sign [q u a][column] ≥ 0
-    wheels (w, 9), spin (w,) : see `nmm.robots.wheel_rates`, and the largest rates, rad/s
+    wheels (w, 9), spin (w,) : see `nmm.model.robots.wheel_rates`, and the largest rates, rad/s
     weights (2 m,) : of u and a; goal (n,), ends (n + m,) : weights of the end's error in q and u, 0 where it
         is free
     aims (N + 1, e, n), aimed (N + 1, e), pull (N + 1, e) : the motion costs pull (aims q - aimed)² / 2

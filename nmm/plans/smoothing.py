@@ -13,13 +13,13 @@ from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.record_layout import Memory, views
 from nmm.collisions.motion_check import MotionCheck
 from nmm.control.limits import LimitsOn
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.wheel_rates import turning_wheels
 from nmm.plans.interior import SHOOT, shoot
 from nmm.plans.objective import SampleCosts
 from nmm.plans.problem import MU, largest_inputs, shooting_problem, steps_within
 from nmm.plans.samples import SampledMotion, Samples
 from nmm.plans.shooting import LOOK, Shooting, first_blocked_sample
-from nmm.robots.robot import Robot
-from nmm.robots.wheel_rates import turning_wheels
 
 #: How many samples a motion has: one for each so many seconds of the path's time, within limits.
 EACH, FEWEST, MOST = 0.27, 24, 80

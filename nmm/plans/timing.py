@@ -9,9 +9,9 @@ import numpy as np
 
 from nmm.base.arrays import Array, Integers
 from nmm.control.limits import LimitsOn
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.wheel_rates import turning_wheels
 from nmm.plans.path import Guide
-from nmm.robots.robot import Robot
-from nmm.robots.wheel_rates import turning_wheels
 
 
 @dataclass(frozen=True)

@@ -28,10 +28,10 @@ from nmm.base.kernels.record_layout import (
     views,
 )
 from nmm.collisions.legs_check import MovedShapes, too_near
+from nmm.model.robots.zero_order_hold import Inputs
 from nmm.plans.samples import flow
 from nmm.plans.tree import draw
 from nmm.plans.words import PARTS, STRAIGHT, dubins, wrapped
-from nmm.robots.zero_order_hold import Inputs
 
 #: A motion has the three parts of a word of Dubins, and a straight line after them.
 DRIVEN = 4

@@ -9,10 +9,10 @@ from nmm.base.arrays import Array
 from nmm.base.errors import InputError
 from nmm.base.kernels.compiled import clear, compiled, scratch
 from nmm.base.kernels.record_layout import Cell, IntegerCell, IntegerVector, Vector
+from nmm.model.platforms.steering import SteeredAxle, SteeringPivot
+from nmm.model.platforms.tractor import Tractor
+from nmm.model.robots.robot import Robot
 from nmm.plans.words import PARTS, dubins, reeds_shepp, wrapped
-from nmm.platforms.steering import SteeredAxle, SteeringPivot
-from nmm.platforms.tractor import Tractor
-from nmm.robots.robot import Robot
 
 #: What a platform does: it stands, moves every way, rolls one way, to and fro or only forwards, or tows
 #: trailers, whose ways are not legs (`nmm.plans.towing`).

@@ -5,11 +5,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from nmm.base.arrays import Array
+from nmm.model.robots.motion import Camera, Motion
+from nmm.model.robots.robot import Robot
 from nmm.playback.drawing import Command, Drawing, Rgb, animation, packed, page_times
 from nmm.playback.keyframes import samples_kept
 from nmm.playback.shapes import DrawnRobot, sphere
-from nmm.robots.motion import Camera, Motion
-from nmm.robots.robot import Robot
 
 SEEN: Rgb = (0.91, 0.55, 0.04)
 FRUSTUM: Rgb = (0.20, 0.26, 0.34)

@@ -15,10 +15,10 @@ from nmm.diagnosis.jumps import chattering
 from nmm.diagnosis.limits import AT_LIMIT
 from nmm.diagnosis.motors import motor_findings, motor_torques
 from nmm.diagnosis.summary import settling_time, summarise
+from nmm.model.robots.motion import Motion
+from nmm.model.robots.robot import Robot
 from nmm.playback.drawing import Drawing, packed
 from nmm.playback.keyframes import MOST_FRAMES, samples_kept
-from nmm.robots.motion import Motion
-from nmm.robots.robot import Robot
 from nmm.runs.components import Axes, components
 from nmm.runs.table import summary_rows
 from nmm.runs.trajectory import Trajectory

@@ -17,11 +17,11 @@ from nmm.analysis.singular.ellipsoids import (
 from nmm.analysis.singular.parts import WHOLE
 from nmm.base.arrays import Array, interpolated
 from nmm.base.ellipsoid_options import EllipsoidOptions
+from nmm.model.robots.motion import Motion
 from nmm.playback.drawing import Command, Drawing, Rgb, animation, page_times
 from nmm.playback.extent import extent_of
 from nmm.playback.keyframes import Keyframes
 from nmm.playback.placements import position_and_quaternion
-from nmm.robots.motion import Motion
 
 #: Colours of the arms' ellipsoids, and of the legend's entry for robots of several colours.
 ARM_COLOR: Rgb = (0.93, 0.62, 0.02)

@@ -8,13 +8,13 @@ import numpy as np
 import pinocchio as pin
 
 from nmm.base.arrays import Array, interpolated
+from nmm.model.robots.motion import Motion
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.surroundings import Carried
 from nmm.playback.keyframes import Keyframes
 from nmm.playback.placements import Placements, base_position
 from nmm.playback.rolling import Rolling
 from nmm.playback.sticks import appearance
-from nmm.robots.motion import Motion
-from nmm.robots.robot import Robot
-from nmm.robots.surroundings import Carried
 
 _CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
 #: Random poses that measure the room a robot can take.

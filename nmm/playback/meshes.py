@@ -12,7 +12,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from nmm.base.arrays import Array, Flags, Integers
-from nmm.robots.mesh_files import meshes_of
+from nmm.model.robots.mesh_files import meshes_of
 
 if TYPE_CHECKING:
     import trimesh

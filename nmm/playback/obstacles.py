@@ -8,13 +8,13 @@ import numpy as np
 import pinocchio as pin
 
 from nmm.base.arrays import Array
+from nmm.model.robots.motion import Motion, Nearest
+from nmm.model.robots.surroundings import Body
 from nmm.playback.drawing import Command, Drawing, Rgb, animation, encode, packed, page_times
 from nmm.playback.extent import shape_corners
 from nmm.playback.keyframes import samples_kept
 from nmm.playback.placements import position_and_quaternion
 from nmm.playback.shapes import Shape, shapes, triangles
-from nmm.robots.motion import Motion, Nearest
-from nmm.robots.surroundings import Body
 
 OBSTACLE: Rgb = (0.62, 0.55, 0.38)
 SCENERY: Rgb = (0.66, 0.70, 0.74)

@@ -7,7 +7,7 @@ import pinocchio as pin
 
 from nmm.base.arrays import Array
 from nmm.base.errors import RobotError
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 #: Configurations at which an input may move a body: a steered body stands still at some.
 _PROBES = 4

@@ -14,11 +14,11 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, vector
+from nmm.model.robots.loading.joint_kinds import axis
+from nmm.model.robots.motion import Motion
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.wheel import Wheel
 from nmm.playback.placements import Carriers, at_point, rolling_joints
-from nmm.robots.loading.joint_kinds import axis
-from nmm.robots.motion import Motion
-from nmm.robots.robot import Robot
-from nmm.robots.wheel import Wheel
 
 
 class Rolling:

@@ -18,6 +18,9 @@ from nmm.base.resolver_style import looks_of_labels
 from nmm.control.controller import Controller
 from nmm.control.quantities import Record
 from nmm.control.recorded import Recorded
+from nmm.model.robots.frame_path import FramePath
+from nmm.model.robots.motion import Camera
+from nmm.model.robots.surroundings import NO_SURROUNDINGS, Surroundings
 from nmm.playback.cameras import live_numbers
 from nmm.playback.channels import live_channels, partition_text
 from nmm.playback.drawing import Drawing, encode, packed
@@ -25,9 +28,6 @@ from nmm.playback.rolling import RolledRobot
 from nmm.playback.scene import playback_scene
 from nmm.playback.server import Visitor
 from nmm.playback.session import RobotSession, Watching, counted
-from nmm.robots.frame_path import FramePath
-from nmm.robots.motion import Camera
-from nmm.robots.surroundings import NO_SURROUNDINGS, Surroundings
 from nmm.runs.components import Axes
 from nmm.runs.joining import row_names
 from nmm.runs.recording import Recorder

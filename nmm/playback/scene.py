@@ -12,7 +12,10 @@ from nmm.base.arrays import Array, interpolated
 from nmm.base.ellipsoid_options import Wanted, options_of
 from nmm.base.errors import expect
 from nmm.base.resolver_style import looks, looks_of_labels
-from nmm.collisions.obstacle import Obstacle, obstacle_places
+from nmm.model.collisions.obstacle import Obstacle, obstacle_places
+from nmm.model.robots.motion import Motion
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.surroundings import Body
 from nmm.playback import extent
 from nmm.playback.cameras import draw_cameras, seen_points, tell_cameras
 from nmm.playback.channels import channels, draw_curves, draw_facts
@@ -31,9 +34,6 @@ from nmm.playback.obstacles import SceneObstacles, draw_nearest
 from nmm.playback.placements import base_position
 from nmm.playback.rolling import wheel_angles
 from nmm.playback.shapes import CARRIED, Y_TO_Z, DrawnRobot, cylinder, sphere
-from nmm.robots.motion import Motion
-from nmm.robots.robot import Robot
-from nmm.robots.surroundings import Body
 from nmm.runs.trajectory import Trajectory
 
 if TYPE_CHECKING:

@@ -17,7 +17,10 @@ import numpy as np
 
 from nmm.base.errors import InputError, expect
 from nmm.base.resolver_style import Look
-from nmm.collisions.obstacle import Obstacle
+from nmm.model.collisions.obstacle import Obstacle
+from nmm.model.robots.motion import Camera
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.surroundings import NO_SURROUNDINGS, Surroundings
 from nmm.playback.cameras import draw_camera, tell_cameras
 from nmm.playback.channels import Channel, Channels, draw_curves
 from nmm.playback.drawing import Command, Drawing, encode
@@ -27,9 +30,6 @@ from nmm.playback.rolling import RolledRobot
 from nmm.playback.scene import draw_beside, live_scene, still
 from nmm.playback.server import PageServer, Visitor
 from nmm.playback.sticks import appearance
-from nmm.robots.motion import Camera
-from nmm.robots.robot import Robot
-from nmm.robots.surroundings import NO_SURROUNDINGS, Surroundings
 
 FPS = 30.0
 #: The clock skips the time of a picture later than this, s.

@@ -8,15 +8,15 @@ import numpy as np
 import pinocchio as pin
 
 from nmm.base.arrays import Array
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.surroundings import Body as Body
+from nmm.model.robots.surroundings import Carried
+from nmm.model.robots.surroundings import Surroundings as Surroundings
 from nmm.playback.drawing import Command, Drawing, Rgb, animation, packed, page_times, segment
 from nmm.playback.keyframes import Keyframes
 from nmm.playback.meshes import OFF, Color, Indices, mesh_pieces
 from nmm.playback.placements import Placements, position_and_quaternion
 from nmm.playback.sticks import appearance
-from nmm.robots.robot import Robot
-from nmm.robots.surroundings import Body as Body
-from nmm.robots.surroundings import Carried
-from nmm.robots.surroundings import Surroundings as Surroundings
 
 fcl = pin.hppfcl
 

@@ -8,12 +8,12 @@ import pinocchio as pin
 
 from nmm.base.arrays import Array
 from nmm.base.errors import RobotError
+from nmm.model.robots.loading.joint_kinds import axis, is_revolute, kind
+from nmm.model.robots.loading.provenance import loaded_parts
+from nmm.model.robots.meshes import read_meshes
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.wheel import Wheel
 from nmm.playback.placements import joint_screw
-from nmm.robots.loading.joint_kinds import axis, is_revolute, kind
-from nmm.robots.loading.provenance import loaded_parts
-from nmm.robots.meshes import read_meshes
-from nmm.robots.robot import Robot
-from nmm.robots.wheel import Wheel
 
 fcl = pin.hppfcl
 

@@ -17,13 +17,13 @@ from nmm.base.resolver_style import looks
 from nmm.control.directions import WORLD_PARTS, direction_words, in_world_axes, readable_basis
 from nmm.functions.function import Function
 from nmm.functions.tasks.task import Task
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 from nmm.playback.drawing import Command, Drawing, encode
 from nmm.playback.ellipsoids import ARM_COLOR, OPACITY, THINNEST, draw_legend
 from nmm.playback.extent import extent_of
 from nmm.playback.server import Visitor
 from nmm.playback.session import message
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
 
 #: A direction is nearly lost where σ_min is below this share of σ_max, rows in natural sizes.
 NEAR = 0.05

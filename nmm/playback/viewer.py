@@ -15,6 +15,9 @@ from nmm.base.arrays import Array
 from nmm.functions.function import Function
 from nmm.functions.program import Program
 from nmm.functions.tasks.task import Stack, Task
+from nmm.model.robots.motion import Motion
+from nmm.model.robots.reach import first_tip, tips
+from nmm.model.robots.robot import Robot
 from nmm.playback.drawing import Command, Drawing, segment
 from nmm.playback.extent import robot_boxes
 from nmm.playback.html import HEIGHT, file_page, framed
@@ -23,9 +26,6 @@ from nmm.playback.rolling import Rolling
 from nmm.playback.scene import draw_beside, live_scene, points_beside, still
 from nmm.playback.session import Session
 from nmm.playback.shapes import DrawnRobot
-from nmm.robots.motion import Motion
-from nmm.robots.reach import first_tip, tips
-from nmm.robots.robot import Robot
 from nmm.runs.shown_frame import shown_frame
 
 if TYPE_CHECKING:

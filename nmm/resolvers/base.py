@@ -14,12 +14,12 @@ from nmm.base.errors import InputError, expect, expect_known
 from nmm.base.findings import Finding
 from nmm.base.kernels.compiled import Kernel, caller, compiled
 from nmm.base.kernels.record_layout import LaidOutRecord, Memory, header_length, views
+from nmm.model.robots.input_weights import Weights as Weights
+from nmm.model.robots.input_weights import by_name
 from nmm.resolvers.answer import Answer, AnswerArrays, unanswered
 from nmm.resolvers.limit_check import keep_limits
 from nmm.resolvers.problem import Dimensions, Problem
 from nmm.resolvers.problem_arrays import ProblemArrays
-from nmm.robots.input_weights import Weights as Weights
-from nmm.robots.input_weights import by_name
 
 #: Signature of a resolver's kernel: `ProblemArrays`, the numbers and options of its `Setup`, the integers of
 #: its `State`, and the `AnswerArrays` that it writes.

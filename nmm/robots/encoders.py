@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, scalar, vector
 from nmm.base.errors import InputError, expect_known, few, no_such
-from nmm.robots.robot import Robot
-from nmm.robots.wheel_rates import steered_wheels
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.wheel_rates import steered_wheels
 
 #: A locked joint that is measured farther from where it is locked makes another robot of it, rad or m.
 HELD = 0.01

@@ -12,8 +12,8 @@ from nmm.base.arrays import Array, Integers
 from nmm.base.errors import InputError, expect
 from nmm.base.findings import Finding
 from nmm.control.quantities import saved
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 from nmm.ros.recorded import Names, Recorded
 from nmm.ros.routes import Route, routes
 from nmm.ros.tracks import by_differences, contradict, settle

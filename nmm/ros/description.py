@@ -11,10 +11,10 @@ import numpy as np
 import pinocchio as pin
 
 from nmm.base.arrays import Array
+from nmm.model.robots.loading.provenance import provenance_of
+from nmm.model.robots.robot import Robot
 from nmm.playback.placements import joint_screw
 from nmm.playback.sticks import appearance
-from nmm.robots.loading.provenance import provenance_of
-from nmm.robots.robot import Robot
 from nmm.ros.links import Link, Links
 
 fcl = pin.hppfcl

@@ -9,7 +9,7 @@ import numpy as np
 
 from nmm.base.arrays import Array, interpolated
 from nmm.base.errors import InputError
-from nmm.robots.configuration import Configuration
+from nmm.model.robots.configuration import Configuration
 from nmm.runs.trajectory import Trajectory
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from nmm.base.arrays import Array, Integers, vector
 from nmm.base.errors import InputError, expect
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 from nmm.ros.making import base_joint, root_link
 from nmm.ros.reading import name_of, nanoseconds, placement, plain, planar, velocities
 from nmm.ros.tracks import Track

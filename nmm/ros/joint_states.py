@@ -7,7 +7,7 @@ from collections.abc import Collection
 from typing import Any
 
 from nmm.base.errors import expect
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 from nmm.ros.reading import name_of, nanoseconds
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pinocchio as pin
 
 from nmm.base.arrays import Array
+from nmm.model.robots.robot import Robot
 from nmm.playback.placements import Placements, position_and_quaternion
-from nmm.robots.robot import Robot
 from nmm.ros.making import base_joint
 
 #: Pinocchio's kinds of frames that are links: a file's, and those of a model made by hand.

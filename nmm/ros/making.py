@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, array, matrix, scalar, vector
 from nmm.base.errors import InputError, expect
+from nmm.model.robots.robot import Robot
 from nmm.playback.placements import position_and_quaternion
-from nmm.robots.robot import Robot
 
 
 class Rclpy(Mapping[str, type]):

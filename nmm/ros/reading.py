@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, increasing, vector
 from nmm.base.errors import InputError, expect
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 #: A platform whose z axis leans more, rad, is not read as one on level ground.
 TILT = 0.2

@@ -13,7 +13,7 @@ import numpy as np
 from nmm.base.arrays import vector
 from nmm.base.errors import InputError, expect
 from nmm.base.findings import Finding
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 from nmm.ros import reading
 from nmm.ros.frames import Edge, Tree, carried, reference
 from nmm.ros.joint_states import parts, timed_joints

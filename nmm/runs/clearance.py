@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nmm.base.arrays import Array, Integers
-from nmm.collisions.obstacle import Obstacle, as_passed, shifts
-from nmm.collisions.scene import Scene
 from nmm.control.controller import Controller
 from nmm.control.integrators import Around, Inputs, Integrator, Velocity
 from nmm.control.safety_filter import SafetyFilter
-from nmm.robots.zero_order_hold import HeldInputs
+from nmm.model.collisions.obstacle import Obstacle, as_passed, shifts
+from nmm.model.collisions.scene import Scene
+from nmm.model.robots.zero_order_hold import HeldInputs
 
 #: Motion between two distance checks: of the coordinates, m and rad together, and of obstacles, m.
 APART = 0.01

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from nmm.base.arrays import Array
 from nmm.control.quantities import RecordedQuantity
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 from nmm.runs.trajectory import Trajectory
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from nmm.base.arrays import Array, counted, positive, scalar
 from nmm.base.errors import InputError, expect, expect_known
 from nmm.base.kernels.record_layout import Matrix, Vector
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 
 class Disturbed(NamedTuple):

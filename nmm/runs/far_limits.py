@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from nmm.base.arrays import Array
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 
 class FarLimits:

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from nmm.base.arrays import Array
-from nmm.robots.robot import Robot
-from nmm.robots.zero_order_hold import HeldInputs
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.zero_order_hold import HeldInputs
 
 
 class HeldHistory:

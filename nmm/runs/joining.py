@@ -11,7 +11,7 @@ import numpy as np
 from nmm.control.controller import Controller
 from nmm.control.quantities import QUANTITIES, saved
 from nmm.control.sequence import Schedule
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 from nmm.runs.clearance import Swept, swept
 from nmm.runs.leg import Leg
 from nmm.runs.residuals import NO_RESIDUALS, Residuals

@@ -9,7 +9,7 @@ import numpy as np
 from nmm.base.arrays import Array, Flags
 from nmm.control.limits import LimitsOn
 from nmm.functions.function import natural_size
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 #: The middle of a range, where what is far from a one-sided limit is placed.
 MIDDLE = 0.5

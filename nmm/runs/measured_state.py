@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array
 from nmm.control.goal import METRES, unit_codes
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 from nmm.runs.held_history import HeldHistory
 
 

@@ -15,8 +15,8 @@ from nmm.control.goal import Goal
 from nmm.control.idle_inputs import idle_inputs
 from nmm.control.integrators import Accelerated, Integrator
 from nmm.control.standing_pose import standing_pose
-from nmm.robots.loading.ground import slip_warnings
-from nmm.robots.loading.provenance import provenance_of
+from nmm.model.robots.loading.ground import slip_warnings
+from nmm.model.robots.loading.provenance import provenance_of
 from nmm.runs.clearance import guarded
 from nmm.runs.closed_loop import drive_loop
 from nmm.runs.leg import Ended, Leaving

@@ -14,8 +14,8 @@ from nmm.functions.function import Function, Sight
 from nmm.functions.program import Program
 from nmm.functions.tasks.image import optical_frame
 from nmm.functions.tasks.task import Task
-from nmm.robots.motion import NORMALISED, PICTURE, Camera
-from nmm.robots.robot import Robot
+from nmm.model.robots.motion import NORMALISED, PICTURE, Camera
+from nmm.model.robots.robot import Robot
 
 
 class GoalRows(NamedTuple):

@@ -12,8 +12,8 @@ from nmm.base.errors import expect
 from nmm.functions.function import Function, Shown
 from nmm.functions.tasks.position import AXES
 from nmm.functions.tasks.task import Task
-from nmm.robots.frame_path import FramePath
-from nmm.robots.robot import Robot
+from nmm.model.robots.frame_path import FramePath
+from nmm.model.robots.robot import Robot
 
 
 class ShownFrame(NamedTuple):

@@ -17,12 +17,12 @@ from nmm.base.findings import Finding
 from nmm.base.findings.run import line
 from nmm.base.lazy_call import lazy_call
 from nmm.base.machine import made_with
-from nmm.collisions.obstacle import Obstacle, obstacle_places
 from nmm.control.quantities import QUANTITIES, Record
 from nmm.control.sequence import Event
-from nmm.robots.motion import Motion, Nearest
-from nmm.robots.robot import Robot
-from nmm.robots.surroundings import NO_SURROUNDINGS, Body, Surroundings
+from nmm.model.collisions.obstacle import Obstacle, obstacle_places
+from nmm.model.robots.motion import Motion, Nearest
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.surroundings import NO_SURROUNDINGS, Body, Surroundings
 from nmm.runs.residuals import NO_RESIDUALS, Residuals
 from nmm.runs.seen import RunCamera
 from nmm.runs.verdict import AS_ASKED, Awaited, Verdict
@@ -31,7 +31,7 @@ from nmm.runs.verdict import Outcome as Outcome
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from nmm.dynamics.torques import Torques
+    from nmm.model.dynamics.torques import Torques
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,7 +302,7 @@ class Trajectory:
         """What the motion asks of the motors, with masses carried, kg by frame (see `nmm.Dynamics`); what the
         scenario says is carried when not given."""
         payload = self.surroundings.payload if payload is None else payload
-        found: Torques = lazy_call("nmm.dynamics.torques:torques_along")(
+        found: Torques = lazy_call("nmm.model.dynamics.torques:torques_along")(
             self.robot, self.t, self.q, self.u, payload, u_dot=self.u_dot
         )
         return found

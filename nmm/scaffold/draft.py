@@ -13,9 +13,9 @@ import numpy as np
 
 from nmm.base.errors import InputError, NmmError, RunError, ScenarioError
 from nmm.base.text_format import one_line
-from nmm.robots.configuration import Configuration
-from nmm.robots.loading.ground import slip_warnings
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading.ground import slip_warnings
+from nmm.model.robots.robot import Robot
 from nmm.runs.trajectory import Outcome, Trajectory
 from nmm.scaffold.end_effector import Hand, HandsPath, hands, paths
 from nmm.scaffold.parts import Chosen, chosen_robot

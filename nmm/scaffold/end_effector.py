@@ -10,8 +10,8 @@ import numpy as np
 from nmm.base.arrays import Array
 from nmm.base.findings import Finding
 from nmm.base.text_format import counted
-from nmm.robots.reach import arm_branches, arm_end, reach
-from nmm.robots.robot import Robot
+from nmm.model.robots.reach import arm_branches, arm_end, reach
+from nmm.model.robots.robot import Robot
 
 #: A range this small is none, m or rad.
 _NO_ROOM = 1e-6

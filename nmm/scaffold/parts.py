@@ -11,8 +11,8 @@ from pydantic import ValidationError
 from nmm.base.bundled import bundled_robots
 from nmm.base.errors import InputError, RobotError, expect
 from nmm.base.files import named_folder
-from nmm.robots.loading.provenance import PLATFORM_SOURCES, provenance_of
-from nmm.robots.robot import Robot
+from nmm.model.robots.loading.provenance import PLATFORM_SOURCES, provenance_of
+from nmm.model.robots.robot import Robot
 from nmm.scenario.keys import first_error
 from nmm.scenario.robot import PACKAGE, MountedPart, RobotPart
 from nmm.scenario.yaml_text import dotted

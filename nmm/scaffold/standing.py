@@ -11,9 +11,9 @@ import numpy as np
 
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError
-from nmm.dynamics.torques import Torques, torques_along
-from nmm.robots.loading.provenance import accelerations_of
-from nmm.robots.robot import Robot
+from nmm.model.dynamics.torques import Torques, torques_along
+from nmm.model.robots.loading.provenance import accelerations_of
+from nmm.model.robots.robot import Robot
 
 #: Of a point of the base and of a slide, m/s²; of joints, steering and the base, rad/s².
 _STRAIGHT, _TURNING = 1.0, 4.0

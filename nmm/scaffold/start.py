@@ -9,10 +9,10 @@ import numpy as np
 
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError, RobotError
-from nmm.collisions.pairs import HULLS, measured_pairs, query_shapes, random_configurations
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
-from nmm.robots.semantics import POSTURE
+from nmm.model.collisions.pairs import HULLS, measured_pairs, query_shapes, random_configurations
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.semantics import POSTURE
 from nmm.scaffold.end_effector import Hand, movable
 from nmm.scaffold.standing import Standing
 from nmm.scenario.short_task import moving_axes

@@ -7,14 +7,14 @@ from pydantic import Field, create_model
 
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError
-from nmm.collisions.obstacle import Obstacle
-from nmm.collisions.shapes import Box, Capsule, ConvexMesh, Cylinder, HalfSpace, Shape, Sphere
 from nmm.control.collisions import Collisions
 from nmm.functions.function import Function
 from nmm.functions.program import Program
 from nmm.functions.references.orientation import rotation_vector
-from nmm.robots.loading.packages import package_file
-from nmm.robots.robot import Robot
+from nmm.model.collisions.obstacle import Obstacle
+from nmm.model.collisions.shapes import Box, Capsule, ConvexMesh, Cylinder, HalfSpace, Shape, Sphere
+from nmm.model.robots.loading.packages import package_file
+from nmm.model.robots.robot import Robot
 from nmm.scenario.constructors import FunctionPart, MadePart, keys_of
 from nmm.scenario.functions import REFERENCE_PARTS
 from nmm.scenario.keys import OneOf, Part, at

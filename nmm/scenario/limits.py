@@ -11,7 +11,7 @@ from nmm.control.limited_function import Bound
 from nmm.control.limits import Limits
 from nmm.control.retreat import Retreat
 from nmm.control.steering import Steering
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 from nmm.scenario.constructors import FunctionPart, MadePart, keys_of
 from nmm.scenario.functions import with_functions
 from nmm.scenario.keys import OneOf, Part, each

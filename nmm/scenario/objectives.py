@@ -13,7 +13,7 @@ from nmm.functions.function import Function
 from nmm.functions.objectives.base import Objective
 from nmm.functions.objectives.clearance import Clearance
 from nmm.functions.objectives.coordinates import Quadratic, QuadraticTerm
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 from nmm.scenario.constructors import (
     Combination,
     FunctionPart,

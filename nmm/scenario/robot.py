@@ -17,8 +17,8 @@ from nmm.scenario.numbers import Number, number, numbers, numbers_by_name
 from nmm.scenario.yaml_text import Place
 
 if TYPE_CHECKING:
-    from nmm.platforms import Platform
-    from nmm.robots.robot import Robot
+    from nmm.model.platforms import Platform
+    from nmm.model.robots.robot import Robot
 
 #: The absolute path of a file that is named at a place of the scenario.
 Absolute = Callable[[str, Place], Path]
@@ -138,7 +138,7 @@ class RobotPart(Part):
     )
 
     def build(self, absolute: Absolute, place: Place) -> Robot:
-        from nmm.robots.loading import load
+        from nmm.model.robots.loading import load
 
         data = self.explicit(absolute, place) | {"platform": _platform(self.platform)}
         return load(data.pop("source"), **data)
@@ -183,7 +183,7 @@ class ArmPart(Part):
     )
 
     def mount_on(self, platform: Robot, absolute: Absolute, place: Place) -> Robot:
-        from nmm.robots.loading import mount
+        from nmm.model.robots.loading import mount
 
         with at("arm"):
             arm = self.arm.build(absolute, (*place, "arm"))
@@ -263,7 +263,7 @@ def _platform(value: str | dict[str, Any] | None) -> Platform | str | None:
     """The platform of a mapping with its kind and parameters; a name stays one."""
     if not isinstance(value, dict):
         return value
-    from nmm.platforms import platform_by_name
+    from nmm.model.platforms import platform_by_name
 
     keywords = {key: item for key, item in value.items() if key != "kind"}
     with at("platform"):

@@ -13,16 +13,16 @@ from pydantic import ValidationError
 from nmm.base.errors import ScenarioError, no_such
 from nmm.base.findings import Finding
 from nmm.base.progress import Progress
-from nmm.robots.surroundings import Surroundings
+from nmm.model.robots.surroundings import Surroundings
 from nmm.scenario.document import Document, read_file
 from nmm.scenario.keys import KeyedError, NamedReferences, as_written, at, first_error
 
 if TYPE_CHECKING:
     from nmm import Plan
-    from nmm.collisions.obstacle import Obstacle
     from nmm.control.controller import Controller
+    from nmm.model.collisions.obstacle import Obstacle
+    from nmm.model.robots.robot import Robot
     from nmm.resolvers.base import Resolver
-    from nmm.robots.robot import Robot
     from nmm.runs.recording import Recorder
     from nmm.runs.trajectory import Trajectory
     from nmm.scenario.sections import Motion

@@ -7,10 +7,10 @@ from pydantic import BeforeValidator, Field
 
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError, expect_known
-from nmm.collisions.obstacle import Obstacle
 from nmm.functions.references.orientation import rotation_vector
-from nmm.robots.robot import Robot
-from nmm.robots.surroundings import Body, Carried, Surroundings
+from nmm.model.collisions.obstacle import Obstacle
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.surroundings import Body, Carried, Surroundings
 from nmm.scenario.collisions import SHAPE_PARTS, ShapePart
 from nmm.scenario.keys import OneOf, Part, at
 from nmm.scenario.numbers import Number, Positive, numbers

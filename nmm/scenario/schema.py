@@ -17,9 +17,9 @@ from nmm.control.goal import Goal
 from nmm.control.sequence import Sequence
 from nmm.control.sequenced import SequencedController
 from nmm.functions.tasks.task import Stack
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.semantics import POSTURE
 from nmm.resolvers.base import Resolver
-from nmm.robots.robot import Robot
-from nmm.robots.semantics import POSTURE
 from nmm.scenario.collisions import CollisionsPart
 from nmm.scenario.disturbances import DisturbancesPart
 from nmm.scenario.functions import REFERENCE_PARTS

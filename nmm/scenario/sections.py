@@ -15,7 +15,7 @@ from nmm.base.findings import Finding
 from nmm.base.plugins import Addition, additions, complain
 from nmm.base.progress import Progress
 from nmm.functions.tasks.task import Task
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 from nmm.scenario.keys import KeyedError, Part
 
 if TYPE_CHECKING:

@@ -12,9 +12,9 @@ from nmm.base.text_format import counted, listed
 from nmm.functions.function import Function
 from nmm.functions.program import evaluate
 from nmm.functions.tasks.task import Task
-from nmm.robots.configuration import Configuration
-from nmm.robots.reach import arm_branches, arm_end
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.reach import arm_branches, arm_end
+from nmm.model.robots.robot import Robot
 from nmm.scenario.constructors import POINT, SPELLINGS, STARRED, parameters
 from nmm.scenario.functions import FUNCTION_PARTS
 from nmm.scenario.keys import KeyedError, as_written, first_error

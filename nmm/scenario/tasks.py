@@ -9,7 +9,7 @@ from nmm.base.errors import InputError, expect_known, few
 from nmm.functions.function import Row
 from nmm.functions.tasks.conditions import After, Between, Condition, While
 from nmm.functions.tasks.task import Task
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 from nmm.scenario.constructors import FunctionPart, keys_of
 from nmm.scenario.functions import FUNCTION_PARTS, Reference, with_functions
 from nmm.scenario.keys import OneOf, Part, at, each

@@ -18,8 +18,8 @@ from nmm.analysis.formulas.written import Auxiliary, Value, value_without
 from nmm.base.errors import InputError, expect, expect_known
 from nmm.base.findings import Finding
 from nmm.functions.tasks.task import Stack
-from nmm.platforms.base import Platform
-from nmm.robots.robot import Robot
+from nmm.model.platforms.base import Platform
+from nmm.model.robots.robot import Robot
 
 #: Most digits of a number in G; more, as of roots, are not readable.
 _READABLE = 20

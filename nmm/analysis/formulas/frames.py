@@ -31,7 +31,7 @@ from nmm.analysis.formulas.written import Auxiliary
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError
 from nmm.base.kernels import records
-from nmm.robots.robot import CENTER_OF_MASS, Robot
+from nmm.model.robots.robot import CENTER_OF_MASS, Robot
 
 
 def center(robot: Robot, geometry: Geometry) -> Vector:

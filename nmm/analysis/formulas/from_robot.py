@@ -15,7 +15,7 @@ from nmm.analysis.formulas.task_rows import frames_of
 from nmm.analysis.singular.jacobians import Jacobians, Tasks, stacked
 from nmm.base.errors import InputError, NmmError, SingularError, expect_known
 from nmm.functions.tasks.task import Stack
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 #: Products of terms that an analysis may take: some seconds.
 BUDGET = 200_000
@@ -92,7 +92,7 @@ def argument_names(robot: Robot, frames: Iterable[str]) -> dict[str, str]:
     """The argument behind each length's label (`x_q2`), "-d" for the negative of d. As two arguments may be
     equal, the file is read once more with each changed by another share, and both values must agree. Computed
     lengths, and those of a robot that was not read from one xacro file, keep their labels."""
-    from nmm.robots.loading import load
+    from nmm.model.robots.loading import load
 
     given = numeric_arguments(robot)
     if not any(given.values()):

@@ -32,7 +32,7 @@ from nmm.base.errors import expect, expect_known
 from nmm.base.findings import Finding
 from nmm.base.kernels.rotations import log3
 from nmm.base.latex import Formula, minor_name, symbol
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 #: Minors that are 0 are counted, not listed, if they are at least so many.
 _MANY = 4

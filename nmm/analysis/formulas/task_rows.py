@@ -24,7 +24,7 @@ from nmm.functions.tasks.image import image_points, log_depth
 from nmm.functions.tasks.pointing import pointing
 from nmm.functions.tasks.pose import frame_pose, orientation_error, pose_error
 from nmm.functions.tasks.position import distance
-from nmm.robots.robot import CENTER_OF_MASS, Robot
+from nmm.model.robots.robot import CENTER_OF_MASS, Robot
 
 #: For errors that are logarithms, the rows of the frame's velocity, linear over angular, that J has at 0.
 _COMPARED: dict[Any, range] = {orientation_error: range(3, 6), pose_error: range(6)}

@@ -15,7 +15,7 @@ from nmm.analysis.singular.jacobians import Subject
 from nmm.base.arrays import Array, counted, vector
 from nmm.base.errors import InputError, expect
 from nmm.base.progress import Progress, between
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 #: Most nodes of a map in all; for more there is no picture, and soon no memory.
 MOST_NODES = 4000 * 4000

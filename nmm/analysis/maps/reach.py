@@ -16,8 +16,8 @@ from nmm.base.kernels.linear_algebra import eliminate
 from nmm.base.kernels.record_layout import IntegerVector, Matrix, Vector, views
 from nmm.base.kernels.velocity_map import place_mimic_joints
 from nmm.base.progress import Progress
-from nmm.robots.frame_path import FramePath
-from nmm.robots.robot import Robot
+from nmm.model.robots.frame_path import FramePath
+from nmm.model.robots.robot import Robot
 
 AXES = "xyz"
 #: Newton steps onto a place, and the longest of them, rad or m: a stretched arm would leap.

@@ -15,7 +15,7 @@ from nmm.analysis.singular.parts import WHOLE
 from nmm.base.arrays import Array, Integers
 from nmm.base.figure_options import PLAIN, FigureOptions
 from nmm.base.lazy_call import lazy_call
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -18,7 +18,7 @@ from nmm.analysis.singular.jacobians import Subject
 from nmm.base.arrays import Array, Integers, counted
 from nmm.base.errors import InputError, expect
 from nmm.base.progress import Progress, between
-from nmm.robots.frame_path import FramePath
+from nmm.model.robots.frame_path import FramePath
 
 #: Postures drawn, and how many of them are led to a singular one each to draw these.
 CONFIGURATIONS, SINGULAR_STARTS = 1 << 16, 1 << 9

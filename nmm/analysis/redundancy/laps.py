@@ -26,8 +26,8 @@ from nmm.control.controller import Controller
 from nmm.functions.function import Function
 from nmm.functions.program import evaluate
 from nmm.functions.references import Bearing, Circle, PiecewisePolynomial, PoseReference
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 from nmm.runs.simulation import simulate
 from nmm.runs.trajectory import Outcome, Trajectory
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from nmm.base.arrays import Array
 from nmm.base.text_format import listed
-from nmm.robots.configuration import Configuration
-from nmm.robots.reach import tips
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.reach import tips
+from nmm.model.robots.robot import Robot
 
 #: An axis is upright when its vertical component is larger than this.
 UPRIGHT = 0.95

@@ -40,10 +40,10 @@ from nmm.diagnosis.diagnose import lines, noticed
 from nmm.functions.program import BESIDE, COMPILED, evaluate
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.task import Stack, Task
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 from nmm.resolvers.answer import Status
 from nmm.resolvers.projected_gradient import ProjectedGradient
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
 from nmm.runs.recording import Recorder
 from nmm.runs.trajectory import Trajectory
 from nmm.runs.verdict import Outcome, Verdict

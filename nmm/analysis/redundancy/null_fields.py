@@ -17,7 +17,7 @@ from nmm.base.kernels.linear_algebra import residual_norm, singular_rows
 from nmm.base.kernels.record_layout import IntegerVector, Vector, record_type, views
 from nmm.control.equations import ControlStep, drive
 from nmm.functions.program import BESIDE, LaidOut
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 #: The motion ends where a singular value that it needs is below this part of the largest.
 NEARLY_SINGULAR = 1e-3

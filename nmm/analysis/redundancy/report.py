@@ -22,8 +22,8 @@ from nmm.control.directions import direction_text
 from nmm.control.idle_inputs import inputs_without_effect
 from nmm.functions.program import Program
 from nmm.functions.tasks.task import Comparison
+from nmm.model.robots.robot import Robot
 from nmm.resolvers.projected_gradient import ProjectedGradient
-from nmm.robots.robot import Robot
 
 #: Singular values of Lie brackets, which are taken by differences, this small beside the largest are zero.
 BRACKET_TOLERANCE = 1e-5

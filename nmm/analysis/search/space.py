@@ -13,7 +13,7 @@ from nmm.analysis.singular.parts import expect_inputs, singular_values
 from nmm.base.arrays import Array, Flags, Integers, positive, vector
 from nmm.base.errors import InputError, SingularError, expect
 from nmm.control.directions import direction_texts, readable_basis
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 TURN = 2.0 * np.pi
 #: Limits that are short of a turn by less than this are a turn, rad: files write pi in some digits.

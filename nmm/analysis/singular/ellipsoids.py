@@ -13,9 +13,9 @@ from nmm.analysis.singular.parts import WHOLE, columns_of
 from nmm.base.arrays import Array, array, matrix, positive
 from nmm.base.ellipsoid_options import EllipsoidOptions, Sizes
 from nmm.base.errors import InputError, expect
-from nmm.robots.frame_path import FramePath
-from nmm.robots.reach import first_tip
-from nmm.robots.robot import Robot
+from nmm.model.robots.frame_path import FramePath
+from nmm.model.robots.reach import first_tip
+from nmm.model.robots.robot import Robot
 
 #: Radii that differ by less than this fraction of the largest are equal: any axes in their plane will do.
 EQUAL = 1e-9

@@ -20,10 +20,10 @@ from nmm.control.equations import ControlStep, write_equation
 from nmm.functions.function import Function, Row, Stage, row_scales
 from nmm.functions.program import BESIDE, COMPILED, LaidOut, run_program
 from nmm.functions.tasks.task import Stack, Task
-from nmm.platforms.base import Platform
+from nmm.model.platforms.base import Platform
+from nmm.model.robots.robot import Robot
 from nmm.resolvers.projected_gradient import ProjectedGradient
 from nmm.resolvers.reduced_gradient import Partition
-from nmm.robots.robot import Robot
 
 #: What an analysis takes as the task: functions f(q) are enough, it needs no targets.
 Tasks: TypeAlias = Task | Function | Stack | Sequence[Task | Function]

@@ -11,7 +11,7 @@ from nmm.base.arrays import Array, Integers
 from nmm.base.errors import InputError, expect_known
 from nmm.base.kernels.spectra import spectra
 from nmm.control.directions import direction_texts, readable_basis
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 #: A rate this small beside the largest singular value is rounding of the differences.
 SMALL_RATE = 1e-7

@@ -16,7 +16,7 @@ from nmm.functions.objectives.base import Objective
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.linear_coordinates import Combination, coefficients
 from nmm.functions.tasks.position import Position
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 #: What the rows before the kernel hold: an angle, a direction, a point.
 ANGLE, DIRECTION, POINT = 0.0, 1.0, 2.0

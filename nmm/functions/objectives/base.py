@@ -13,8 +13,8 @@ from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.functions.callbacks import of_configuration
 from nmm.functions.function import Evaluation, Function, Row, Stage, only_row, stacked
 from nmm.functions.program import evaluate
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 
 
 @kernel(FUNCTION)

@@ -12,15 +12,15 @@ import numpy as np
 from nmm.base.arrays import Array, positive, scalar
 from nmm.base.errors import InputError
 from nmm.base.kernels.record_layout import Memory, views
-from nmm.collisions.obstacle import Obstacle
-from nmm.collisions.rows import Rows, no_rows
-from nmm.collisions.scene import Scene, set_up
 from nmm.functions.callbacks import stage
 from nmm.functions.function import Evaluation, Stage
 from nmm.functions.objectives.base import Objective
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
-from nmm.robots.zero_order_hold import RollingPreview
+from nmm.model.collisions.obstacle import Obstacle
+from nmm.model.collisions.rows import Rows, no_rows
+from nmm.model.collisions.scene import Scene, set_up
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.zero_order_hold import RollingPreview
 
 #: Usual way that is looked ahead with wheels that have to roll to turn, m. What turns on the spot drove
 #: around random obstacles less often with it than without.

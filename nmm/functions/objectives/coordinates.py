@@ -18,7 +18,7 @@ from nmm.functions.function import Function, Stage, only_row, stacked
 from nmm.functions.objectives.base import Objective
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.linear_coordinates import Combination, coefficients, label
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 #: How many numbers a term begins with; its n coefficients follow.
 HEAD = 4

@@ -19,8 +19,8 @@ from nmm.base.kernels.records import At, Frames
 from nmm.base.kernels.velocity_map import to_coordinates, to_inputs
 from nmm.functions.function import Stage, natural_size
 from nmm.functions.objectives.base import Objective
-from nmm.robots.input_weights import Weights, by_name
-from nmm.robots.robot import Robot
+from nmm.model.robots.input_weights import Weights, by_name
+from nmm.model.robots.robot import Robot
 
 ROWS = {"x": 0, "y": 1, "z": 2, "rx": 3, "ry": 4, "rz": 5}
 Part = Literal["robot", "arm", "platform"]

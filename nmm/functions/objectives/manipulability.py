@@ -16,8 +16,8 @@ from nmm.functions.function import Function, Stage
 from nmm.functions.objectives.base import Sum
 from nmm.functions.objectives.jacobian import JacobianObjective, Part, contract, decomposed, shape_of
 from nmm.functions.references.polynomial import Constant
-from nmm.robots.input_weights import Weights
-from nmm.robots.robot import Robot
+from nmm.model.robots.input_weights import Weights
+from nmm.model.robots.robot import Robot
 
 
 @kernel(FUNCTION)

@@ -11,7 +11,7 @@ from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.functions.function import Stage
 from nmm.functions.objectives.base import Objective
 from nmm.functions.tasks.position import CenterOfMass
-from nmm.robots.robot import CENTER_OF_MASS, Robot
+from nmm.model.robots.robot import CENTER_OF_MASS, Robot
 
 
 @kernel(FUNCTION)

@@ -13,7 +13,7 @@ from nmm.base.kernels.compiled import kernel
 from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.functions.function import Function, Row, Shown, Stage, named
 from nmm.functions.references.polynomial import PiecewisePolynomial, piecewise_polynomial
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 
 @kernel(FUNCTION)

@@ -11,7 +11,7 @@ from nmm.base.arrays import Array, array, scalar, vector
 from nmm.base.kernels.compiled import compiled, kernel
 from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.functions.function import Function, LiveNumbers, Row, Stage
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 
 @compiled

@@ -21,7 +21,7 @@ from nmm.base.kernels.rotations import (
 )
 from nmm.functions.function import Function, Row, Stage, named, stacked
 from nmm.functions.references.polynomial import Constant, Profile, share_of_way
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 #: How far RᵀR may be from the identity, and a quaternion from length 1.
 SLACK = 1e-6

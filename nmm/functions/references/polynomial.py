@@ -13,7 +13,7 @@ from nmm.base.errors import expect, expect_known
 from nmm.base.kernels.compiled import kernel
 from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.functions.function import Function, Row, Stage
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 
 @kernel(FUNCTION)

@@ -16,9 +16,9 @@ from nmm.functions.function import Function, Row, Shown, Sight, Stage, stacked
 from nmm.functions.program import evaluate
 from nmm.functions.tasks.image_kernels import image_line, image_moments, image_points, log_depth
 from nmm.functions.tasks.position import as_point, check_point
-from nmm.robots.configuration import Configuration
-from nmm.robots.motion import NORMALISED
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.motion import NORMALISED
+from nmm.model.robots.robot import Robot
 
 #: Points that a camera sees: each as three numbers, a frame's name or a function; or `MeasuredPoints`.
 Points: TypeAlias = Function | Sequence[Function | str | ArrayLike]

@@ -12,7 +12,7 @@ from nmm.base.kernels.compiled import kernel
 from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.base.text_format import signed_sum
 from nmm.functions.function import Function, Row, Stage
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 #: A coordinate's name, or the coefficients of several.
 Combination = str | Mapping[str, float]

@@ -22,8 +22,8 @@ from nmm.functions.references.live_target import signal
 from nmm.functions.tasks.camera_faults import CameraFaults
 from nmm.functions.tasks.depth_estimate import ALMOST_SURE, DepthEstimate, MotionEstimate
 from nmm.functions.tasks.image import Points, Seen
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.robot import Robot
 
 
 class MeasuredPoints(Seen):

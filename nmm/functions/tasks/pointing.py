@@ -15,7 +15,7 @@ from nmm.base.kernels.rotations import transposed_times3
 from nmm.functions.function import Function, Row, Shown, Stage
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.position import as_point, check_point
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 UNIT = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 #: For each world axis, the two that span the plane in which the angle is measured, right-handed.

@@ -22,7 +22,7 @@ from nmm.base.kernels.rotations import (
     transposed_times3,
 )
 from nmm.functions.function import Function, Row, Shown, Stage
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 #: Rows of a pose and their units: position over rotation vector.
 PARTS = ("x", "y", "z", "rx", "ry", "rz")

@@ -16,7 +16,7 @@ from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.functions.function import Function, Row, Stage, named
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.pose import PartsOfPose, frame_pose
-from nmm.robots.robot import CENTER_OF_MASS, Robot
+from nmm.model.robots.robot import CENTER_OF_MASS, Robot
 
 AXES = {"x": 0, "y": 1, "z": 2}
 

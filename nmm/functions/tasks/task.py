@@ -14,7 +14,7 @@ from nmm.base.errors import InputError, expect, expect_kind, expect_known, one_o
 from nmm.functions.function import Function, Row, Stage
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.conditions import After, Between, Condition, While, by_unit
-from nmm.robots.robot import Robot
+from nmm.model.robots.robot import Robot
 
 
 class Task:

@@ -1,0 +1,208 @@
+"""A robot's shapes for distance queries, and which of them touch in random configurations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError, expect_known
+from nmm.base.text_format import is_pattern, matching
+from nmm.model.collisions.shapes import hull
+from nmm.model.robots.robot import Robot
+
+#: Two shapes by their numbers.
+Pair = tuple[int, int]
+HULLS, CAPSULES = "hulls", "capsules"
+#: Half of the thickness that a mesh without volume is given, m.
+THIN = 5e-4
+_CORNERS = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, -1).T
+#: How many configurations are drawn to see which pairs always touch, and how often links do.
+SAMPLES, CONFIGURATIONS = 200, 1000
+#: Coordinates without limits are drawn from ± this, m or rad.
+RANGE = 4.0
+#: Limits of this size are none.
+ENDLESS = 1e3
+
+
+def query_shapes(robot: Robot, meshes: str = HULLS) -> pin.GeometryModel:
+    """The robot's collision shapes, all convex, without pairs: primitives as they are, meshes as "hulls" or
+    as "capsules" around their points."""
+    found = pin.GeometryModel()
+    for shape in robot.collision_model.geometryObjects:
+        copied, placement = pin.GeometryObject(shape), shape.placement
+        if isinstance(shape.geometry, coal.BVHModelBase):
+            points = np.array(shape.geometry.vertices()).reshape(-1, 3)
+            copied.geometry, own = _capsule(points) if meshes == CAPSULES else (_hull(points), None)
+            copied.placement = placement if own is None else placement * own
+        found.addGeometryObject(copied)
+    return found
+
+
+def link_names(robot: Robot, shapes: pin.GeometryModel) -> tuple[str, ...]:
+    return tuple(robot.model.frames[shape.parentFrame].name for shape in shapes.geometryObjects)
+
+
+def _hull(points: Array) -> Any:
+    try:
+        return hull(points)
+    except InputError:  # a plate: both of its sides
+        return hull(np.vstack([points + THIN * corner for corner in _CORNERS]))
+
+
+def _capsule(points: Array) -> tuple[Any, pin.SE3]:
+    middle = points.mean(axis=0)
+    axes = np.linalg.svd(points - middle, full_matrices=False)[2]
+    axes[2] = np.cross(axes[0], axes[1])
+    turn = axes[[1, 2, 0]].T  # the longest along z
+    local = (points - middle) @ turn
+    center = np.append((local[:, :2].min(axis=0) + local[:, :2].max(axis=0)) / 2.0, 0.0)
+    local -= center
+    across = np.linalg.norm(local[:, :2], axis=1)
+    radius = max(float(across.max()), THIN)
+    caps = np.sqrt(np.maximum(radius**2 - across**2, 0.0))
+    low, high = float((local[:, 2] + caps).min()), float((local[:, 2] - caps).max())
+    if low > high:
+        low = high = (low + high) / 2.0
+    center[2] = (low + high) / 2.0
+    return coal.Capsule(radius, max(high - low, THIN)), pin.SE3(turn, middle + turn @ center)
+
+
+def random_configurations(robot: Robot, count: int = SAMPLES, seed: int = 0) -> Array:
+    rng = np.random.default_rng(seed)
+    limits = robot.q_limits
+    ends = np.where(robot.limited & (np.abs(limits) < ENDLESS), limits, [-RANGE, RANGE])
+    return robot.following.placed(rng.uniform(ends[:, 0], ends[:, 1], (count, robot.n)))
+
+
+def touching(
+    robot: Robot, shapes: pin.GeometryModel, pairs: Sequence[Pair], distance: float
+) -> dict[Pair, float]:
+    """The share of random configurations in which each pair is nearer than `distance`, m."""
+    measure = measured_pairs(robot, shapes, pairs)
+    near = sum((measure(q) < distance for q in random_configurations(robot)), start=np.zeros(len(pairs)))
+    return dict(zip(pairs, (near / SAMPLES).tolist(), strict=True))
+
+
+@lru_cache(maxsize=8)
+def own_shapes(robot: Robot, meshes: str, distance: float) -> tuple[pin.GeometryModel, frozenset[Pair]]:
+    """`query_shapes`, which are not to be changed, and of the model's pairs those nearer than `distance`, m,
+    in every random configuration."""
+    shapes = query_shapes(robot, meshes)
+    pairs = [(pair.first, pair.second) for pair in robot.collision_model.collisionPairs]
+    return shapes, frozenset(always_near(robot, shapes, pairs, distance))
+
+
+def always_near(
+    robot: Robot, shapes: pin.GeometryModel, pairs: Sequence[Pair], distance: float
+) -> list[Pair]:
+    """The pairs nearer than `distance`, m, in every random configuration."""
+    left = list(pairs)
+    measure = measured_pairs(robot, shapes, left)
+    for q in random_configurations(robot):
+        if not left:
+            break
+        near = measure(q) < distance
+        left[:] = [pair for pair, is_near in zip(left, near, strict=True) if is_near]
+    return left
+
+
+def measured_pairs(
+    robot: Robot, shapes: pin.GeometryModel, pairs: Sequence[Pair]
+) -> Callable[[Array], Array]:
+    """The function q (n,) -> each pair's distance (pairs,), m; below 0 inside each other."""
+    model, data, found = robot.model, robot.model.createData(), pin.GeometryData(shapes)
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    objects = shapes.geometryObjects
+
+    def measure(q: Array) -> Array:
+        pin.updateGeometryPlacements(model, data, shapes, found, q)
+        distances = np.zeros(len(pairs))
+        for k, (i, j) in enumerate(pairs):
+            result.clear()
+            one, two = (coal.Transform3s(found.oMg[x].rotation, found.oMg[x].translation) for x in (i, j))
+            distances[k] = coal.distance(objects[i].geometry, one, objects[j].geometry, two, request, result)
+        return distances
+
+    return measure
+
+
+def named_pairs(given: Sequence[tuple[str, str]], names: Sequence[Sequence[str]], what: str) -> set[Pair]:
+    """The pairs that names mean, by the `names` of each shape, with * for any letters and ? for one;
+    `InputError` for unknown names, patterns that nothing matches, or not two."""
+    known = list(dict.fromkeys(name for of_one in names for name in of_one))
+    found: set[Pair] = set()
+    for pair in given:
+        if isinstance(pair, str) or not isinstance(pair, Sequence) or len(pair) != 2:
+            raise InputError(where=what, expected="two names", got=pair)
+        meant = [_meant(name, known, what) for name in pair]
+        first, second = ([i for i, of_one in enumerate(names) if not one.isdisjoint(of_one)] for one in meant)
+        found |= {(min(i, j), max(i, j)) for i in first for j in second}
+    return found
+
+
+def _meant(name: str, known: Sequence[str], what: str) -> set[str]:
+    """The names that one stands for: itself, or those that a pattern matches."""
+    if is_pattern(name) and name not in known and (matched := matching(name, known)):
+        return {*matched}
+    expect_known("link, shape or obstacle", name, known, what)
+    return {name}
+
+
+@dataclass(frozen=True)
+class Touching:
+    """Which links touch in random configurations; `shares` by pairs of names, the greatest first."""
+
+    shapes: int
+    configurations: int
+    shares: dict[tuple[str, str], float]
+
+    @property
+    def never(self) -> list[tuple[str, str]]:
+        return [pair for pair, share in self.shares.items() if share == 0.0]
+
+    @property
+    def always(self) -> list[tuple[str, str]]:
+        """The pairs that touched in every configuration: neighbours, by how they are drawn."""
+        return [pair for pair, share in self.shares.items() if share == 1.0]
+
+    @property
+    def sometimes(self) -> dict[tuple[str, str], float]:
+        return {pair: share for pair, share in self.shares.items() if 0.0 < share < 1.0}
+
+
+def touching_links(robot: Robot, count: int = CONFIGURATIONS) -> Touching:
+    """How often the links of the model's collision pairs touch, meshes as convex hulls.
+
+    Parameters
+    ----------
+    count : how many random configurations within limits are looked at
+
+    Raises
+    ------
+    RobotError : meshes that cannot be read
+    """
+    shapes = query_shapes(robot)
+    links = link_names(robot, shapes)
+    pairs = [(pair.first, pair.second) for pair in robot.collision_model.collisionPairs]
+    if not pairs:
+        return Touching(len(links), count, {})
+    for pair in pairs:
+        shapes.addCollisionPair(pin.CollisionPair(*pair))
+    found, data = pin.GeometryData(shapes), robot.model.createData()
+    named = [(links[i], links[j]) for i, j in pairs]
+    distinct = list(dict.fromkeys(named))
+    column = np.array([distinct.index(pair) for pair in named])
+    touched = np.zeros(len(distinct))
+    for q in random_configurations(robot, count):
+        pin.computeCollisions(robot.model, data, shapes, found, q, False)
+        hit = [result.isCollision() for result in found.collisionResults]
+        touched[np.unique(column[hit])] += 1.0
+    order = np.argsort(-touched, kind="stable")
+    return Touching(len(links), count, {distinct[k]: float(touched[k]) / count for k in order})

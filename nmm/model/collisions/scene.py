@@ -1,0 +1,150 @@
+"""A robot among obstacles: its shapes and theirs, which pairs are kept apart, and what was left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError, RobotError, few
+from nmm.model.collisions.obstacle import Obstacle
+from nmm.model.collisions.pairs import always_near, link_names, named_pairs, own_shapes, touching
+from nmm.model.collisions.queries import Queries
+from nmm.model.collisions.shapes import HalfSpace
+from nmm.model.robots.loading.srdf import read_srdf
+from nmm.model.robots.loading.srdf_fitting import disabled_pairs
+from nmm.model.robots.robot import Robot
+
+#: A robot does not stand on, but is inside, an obstacle that contains every shape at least this deep, m.
+DEEP = 0.01
+#: A pair may have several rows where it is nearer than this beyond the distance to keep, m.
+FACES = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A robot and obstacles between which distances are measured.
+
+    Attributes
+    ----------
+    robot : the robot
+    obstacles : in the order of their shapes, half-spaces last
+    queries : which measures distances
+    names (P,) : what the two of a pair are called: links, obstacles
+    distance : to keep, m
+    notes : what was left out and why, a sentence each
+    """
+
+    robot: Robot
+    obstacles: tuple[Obstacle, ...]
+    queries: Queries
+    names: tuple[tuple[str, str], ...]
+    distance: float
+    notes: tuple[str, ...]
+
+    def words(self, pair: int) -> str:
+        """The two of a pair, for messages; "nothing" for -1."""
+        return "nothing" if pair < 0 else " and ".join(self.names[pair])
+
+    def places(self, t: float) -> tuple[Any, ...]:
+        """Pinocchio's placements of the obstacles at t, s; None for one with a path, which a record knows."""
+        return tuple(None if one.moves else one.at(t) for one in self.obstacles)
+
+    def check_start(self, t: float, q: Array) -> list[str]:
+        """What is nearer than the distance at q (n,), a sentence each pair, the nearest first.
+
+        Raises
+        ------
+        InputError : an obstacle contains a shape of the robot: no distance shows the way out
+        """
+        found = self.queries.distances(t, q, range(len(self.names)))
+        for k in np.flatnonzero(found < 0.0):
+            if self.queries.inside(int(k)):
+                link, obstacle = self.names[k]
+                what = f"contains {link} at the start ({-found[k]:.3g} m deep)"
+                raise InputError(what, where=f"obstacle {obstacle}")
+        order = np.argsort(found)
+        return [
+            f"{self.words(int(k))} are {found[k]:.4g} m apart at the start"
+            for k in order[: np.count_nonzero(found < self.distance)]
+        ]
+
+
+def set_up(
+    robot: Robot,
+    obstacles: Sequence[Obstacle],
+    *,
+    own: bool,
+    distance: float,
+    band: float,
+    ignore: Sequence[tuple[str, str]],
+    srdf: str | Path | bool | None,
+    meshes: str,
+) -> Scene:
+    """`RobotError` without collision shapes or readable meshes; `InputError`: unknown names, no pairs."""
+    if not len(robot.collision_model.geometryObjects):
+        what = "it has no collision shapes; <collision> in its file, a box or cylinder a link, makes some"
+        raise RobotError(what, where=robot.name)
+    own_ones, own_near = own_shapes(robot, meshes, distance)
+    shapes = own_ones.copy()
+    count = len(shapes.geometryObjects)
+    links = link_names(robot, shapes)
+    known: list[tuple[str, ...]] = [
+        (shape.name, link) for shape, link in zip(shapes.geometryObjects, links, strict=True)
+    ]
+    clash = sorted({one.name for one in obstacles} & {name for names in known for name in names})
+    if clash:
+        raise InputError(f"{clash[0]} is a link or shape of the robot", where="collisions: obstacles")
+    sorted_obstacles = tuple(sorted(obstacles, key=lambda one: isinstance(one.shape, HalfSpace)))
+    for one in sorted_obstacles:
+        shapes.addGeometryObject(pin.GeometryObject(one.name, 0, 0, one.at(0.0), one.shape.geometry()))
+        known.append((one.name,))
+    wanted = [(pair.first, pair.second) for pair in robot.collision_model.collisionPairs] if own else []
+    wanted += [(i, j) for j in range(count, count + len(sorted_obstacles)) for i in range(count)]
+    notes: list[str] = []
+
+    def name(pair: tuple[int, int]) -> str:
+        return f"{known[pair[0]][-1]} and {known[pair[1]][-1]}"
+
+    left_out = named_pairs(ignore, known, "collisions: ignore")
+    if srdf is True and not robot.semantics.files:
+        raise InputError(f"none is beside the file of {robot.name}", where="srdf", expected="a path")
+    if srdf:
+        all_disabled = robot.semantics.disabled if srdf is True else disabled_pairs(read_srdf(srdf), robot)
+        disabled = [pair for pair in all_disabled if all(any(one in n for n in known) for one in pair)]
+        found = named_pairs(disabled, known, "srdf") & {*wanted}
+        touch = touching(robot, shapes, sorted(found), 0.0)
+        often = [f"{name(pair)} ({share:.1%})" for pair, share in touch.items() if 0.0 < share < 1.0]
+        notes.append(f"left out by the SRDF: {len(found)} pairs of shapes")
+        disables = "the SRDF disables pairs that do touch, in a share of random configurations"
+        notes += [f"{disables}: {few(often)}"] if often else []
+        left_out |= found
+    wanted = [pair for pair in wanted if pair not in left_out]
+    always = [pair for pair in wanted if pair in own_near]
+    always += always_near(robot, shapes, [pair for pair in wanted if pair[1] >= count], distance)
+    if always:
+        near = list(dict.fromkeys(name(pair) for pair in always))
+        notes.append(
+            f"left out, as nearer than {distance:g} m in every configuration tried: {len(always)} "
+            f"pairs of shapes: {few(near)}"
+        )
+    for j, one in enumerate(sorted_obstacles, count):
+        pairs = [pair for pair in wanted if pair[1] == j]
+        touches = bool(pairs) and {*pairs} <= {*always}
+        if touches and len(always_near(robot, shapes, pairs, -DEEP)) == len(pairs):
+            what = f"contains {robot.name} in every configuration tried"
+            raise InputError(what, where=f"obstacle {one.name}")
+    kept = [pair for pair in wanted if pair not in {*always}]
+    if not kept:
+        raise InputError(f"nothing to keep {robot.name} from: no obstacle, no own shape", where="collisions")
+    shapes.removeAllCollisionPairs()
+    for pair in kept:
+        shapes.addCollisionPair(pin.CollisionPair(*pair))
+    queries = Queries(robot, shapes, sorted_obstacles, band, distance + FACES)
+    names = tuple((known[i][-1], known[j][-1]) for i, j in kept)
+    return Scene(robot, sorted_obstacles, queries, names, distance, tuple(notes))

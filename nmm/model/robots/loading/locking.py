@@ -1,0 +1,195 @@
+"""Models with joints fixed at given values, and with them the joints that mimic them; collision pairs."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import pinocchio as pin
+
+from nmm.base.arrays import Array, scalar
+from nmm.base.errors import InputError, RobotError, expect_known
+from nmm.base.findings import Finding
+from nmm.base.text_format import apart, is_pattern, matching
+from nmm.model.robots.loading.chain import CHAIN, Rebuilt
+from nmm.model.robots.loading.joint_kinds import is_revolute
+from nmm.model.robots.mimic_joints import MimicJoint, first_leaders, settled
+from nmm.model.robots.robot import Robot
+
+# Limits are decimal fractions of angles that are none.
+_SLACK = 1e-9
+
+
+def told_apart(model: pin.Model, tag: str) -> tuple[pin.Model, dict[str, str]]:
+    """A copy in which every frame that is no joint's has a name of its own, and the names by these."""
+    # Pinocchio's reduction and composition look frames up by their names alone.
+    copied, names = model.copy(), {}
+    for index, frame in enumerate(copied.frames):
+        if index and frame.type != pin.FrameType.JOINT:
+            names[f"{tag}{index}"] = frame.name
+            frame.name = f"{tag}{index}"
+    return copied, names
+
+
+def at_zero(
+    model: pin.Model, geometries: Sequence[pin.GeometryModel], joints: Collection[str]
+) -> tuple[pin.Model, tuple[pin.GeometryModel, ...]]:
+    """The models with the named joints fixed at zero; unchanged without any."""
+    if not joints:
+        return model, tuple(geometries)
+    return reduced(model, geometries, [model.getJointId(name) for name in joints], np.zeros(model.nq))
+
+
+def reduced(
+    model: pin.Model, geometries: Sequence[pin.GeometryModel], joints: Sequence[int], q: Array
+) -> tuple[pin.Model, tuple[pin.GeometryModel, ...]]:
+    """The models with some joints fixed at their values in q; frames and shapes in the same order."""
+    lean, shapes = pin.buildReducedModel(told_apart(model, "&")[0], list(geometries), list(joints), q)
+    # Pinocchio makes the frame of a fixed joint its own parent (a climb to the root would not end), and
+    # does not find it again as the frame of a shape.
+    for frame, original in zip(lean.frames, model.frames, strict=True):
+        frame.name, frame.parentFrame = original.name, original.parentFrame
+    for geometry, before in zip(shapes, geometries, strict=True):
+        for shape, original in zip(geometry.geometryObjects, before.geometryObjects, strict=True):
+            shape.parentFrame = original.parentFrame
+    return lean, tuple(shapes)
+
+
+def add_pairs(model: pin.Model, geometry: pin.GeometryModel, split: int | None = None) -> None:
+    """Adds all pairs of shapes on bodies that no joint connects (neighbours touch by design); with `split`,
+    only those of a shape before that index with one after."""
+    joints = [shape.parentJoint for shape in geometry.geometryObjects]
+    for i, j in combinations(range(len(joints)), 2):
+        one, other = joints[i], joints[j]
+        apart = one != other and model.parents[one] != other and model.parents[other] != one
+        if apart and (split is None or i < split <= j):
+            geometry.addCollisionPair(pin.CollisionPair(i, j))
+
+
+@dataclass(frozen=True)
+class Locked:
+    """A model with joints fixed: those named at `values` (rad or m), and those `mimicked` with their leaders.
+    `mimic_joints` still move, each after its leader."""
+
+    rebuilt: Rebuilt
+    values: Mapping[str, float]
+    mimicked: Mapping[str, tuple[str, float]]
+    mimic_joints: tuple[MimicJoint, ...]
+
+
+def with_locked(
+    rebuilt: Rebuilt,
+    lock: Mapping[str, float],
+    mimic_joints: Sequence[MimicJoint],
+    where: str,
+    own: Sequence[str] = (),
+    standing: Mapping[str, float] | None = None,
+) -> Locked:
+    """The model with joints of `lock` (see `load`) and of `standing` (no note) fixed on the body above them;
+    `RobotError` for no joint, one of the platform's `own`, and no number or one outside the limits."""
+    model = rebuilt.model
+    free = [str(name) for name in list(model.names)[1:] if name not in CHAIN]  # a fixed base has no chain
+    lock = _named(lock, [name for name in free if name not in own], mimic_joints, where)
+    values = {name: _value(name, value, free, own, where) for name, value in lock.items()}
+    for name, value in values.items():
+        _check_limits(model, name, value, where, "")
+    mimic_joints = [one for one in mimic_joints if one.joint not in lock]  # a locked joint follows none
+    # A leader that is no joint of the model is a fixed one, which stands at zero.
+    fixed = {one.leader: 0.0 for one in mimic_joints if one.leader not in free}
+    standing = {**(standing or {}), **values}
+    mimicked, moving = settled(mimic_joints, {**fixed, **standing})
+    for name, (leader, value) in mimicked.items():
+        _check_limits(model, name, value, where, f", which follows {leader}")
+    still = {**standing, **{name: value for name, (_, value) in mimicked.items()}}
+    if not still:
+        return Locked(rebuilt, {}, {}, moving)
+    q = np.zeros(model.nq)
+    ids = [model.getJointId(name) for name in still]
+    for joint, value in zip(ids, still.values(), strict=True):
+        q[model.joints[joint].idx_q] = value
+    lean, geometries = reduced(model, rebuilt.geometries, ids, q)
+    notes = [*rebuilt.notes]
+    if values:
+        notes.append(Finding("joints_locked", {"values": values}))
+    if mimicked:
+        at = {name: [leader, value] for name, (leader, value) in mimicked.items()}
+        notes.append(Finding("mimics_locked", {"values": at}))
+    return Locked(Rebuilt(lean, geometries, tuple(notes)), values, mimicked, moving)
+
+
+def _named(
+    lock: Mapping[str, float], free: Sequence[str], mimic_joints: Sequence[MimicJoint], where: str
+) -> dict[str, float]:
+    """Values by joint: of a pattern's joints those that are not named themselves, and follow none of them."""
+    leaders = {one.joint: one.leader for one in first_leaders(mimic_joints)}
+    found: dict[str, float] = {}
+    for key, value in lock.items():
+        if not is_pattern(key):
+            continue
+        matched = matching(key, free)
+        if not matched:
+            raise RobotError(f"no joint matches {key!r}", where=f"{where}: lock", got=key, available=free)
+        found |= {name: value for name in matched if leaders.get(name) not in matched}
+    return found | {key: value for key, value in lock.items() if not is_pattern(key)}
+
+
+def _value(name: str, value: float, free: Sequence[str], own: Sequence[str], where: str) -> float:
+    expect_known("joint to lock", name, [joint for joint in free if joint not in own], where, RobotError)
+    try:
+        return scalar(value, f"lock: {name}")
+    except InputError as error:
+        raise error.at(where, RobotError) from None
+
+
+def _check_limits(model: pin.Model, name: str, value: float, where: str, more: str) -> None:
+    index = model.joints[model.getJointId(name)].idx_q
+    lower, upper = float(model.lowerPositionLimit[index]), float(model.upperPositionLimit[index])
+    if not lower - _SLACK <= value <= upper + _SLACK:
+        what = "{} is outside its limits, from {} to {}".format(*apart(value, lower, upper, digits=6))
+        raise RobotError(what, where=f"{where}: lock: {name}{more}", got=value)
+
+
+def among_coordinates(
+    mimic_joints: Sequence[MimicJoint], rolling: Sequence[str], where: str
+) -> tuple[tuple[MimicJoint, ...], list[Finding]]:
+    """The mimic joints that are coordinates, each by an independent leader, and notes; `RobotError` for one
+    that follows a wheel or swivel (`rolling`), which the ground turns."""
+    found = tuple(one for one in first_leaders(mimic_joints) if one.joint not in rolling)
+    for one in found:
+        if one.leader in rolling:
+            what = (
+                f"{one.joint} follows {one.leader}, which the ground turns and is no coordinate: lock "
+                f"{one.joint}, or name the wheels without {one.leader} (--wheels, wheels)"
+            )
+            raise RobotError(what, where=where, got=one.joint)
+    notes = []
+    if found:
+        notes.append(Finding("mimic_joints", {"names": [*map(str, found)]}))
+    if len(found) < len(mimic_joints):
+        turned = [one.joint for one in mimic_joints if one.joint in rolling]
+        notes.append(Finding("mimics_of_ground", {"names": turned}))
+    return found, notes
+
+
+#: A slide with more room than this, m, is longer than arms have.
+_LONG = 5.0
+
+
+def limit_notes(robot: Robot) -> list[Finding]:
+    """Notes on the mimic joints whose limits are ignored, and on slides that no arm has."""
+    found = []
+    for one in robot.unheeded:
+        i = robot.coordinate(one.joint)
+        ends = robot.model.lowerPositionLimit, robot.model.upperPositionLimit
+        limits = {name: float(end[i]) for name, end in zip(("lower", "upper"), ends, strict=True)}
+        values = {"mimic": str(one), "name": one.joint, "leader": one.leader, **limits}
+        found.append(Finding("mimic_limits_ignored", values))
+    rooms = dict(zip(robot.q_names, np.diff(robot.q_limits)[:, 0].tolist(), strict=True))
+    slides = {
+        name: rooms[name]
+        for name in robot.q_names[robot.platform.n_p :]
+        if _LONG < rooms[name] < np.inf and not is_revolute(robot.model.joints[robot.model.getJointId(name)])
+    }
+    if slides:
+        found.append(Finding("slides_long", {"rooms": slides}))
+    return found

@@ -1,0 +1,333 @@
+"""What a robot takes of an SRDF: postures, groups of inputs, joints without a motor, links that may touch."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from nmm.base.errors import RobotError, expect_known
+from nmm.base.findings import Finding
+from nmm.model.robots.loading.provenance import provenance_of
+from nmm.model.robots.loading.srdf import read_srdf, srdf_beside
+from nmm.model.robots.loading.srdf_parts import Group, Srdf
+from nmm.model.robots.robot import Robot
+from nmm.model.robots.semantics import NamedPostures, Semantics
+
+#: What Pinocchio calls the joint between the world and the robot.
+_ROOT = "root_joint"
+#: How far a follower, or a locked joint, may be from where a state wants it, m or rad: files have few digits.
+_SLACK = 1e-4
+_JOINTS = (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)
+
+
+def with_srdf(
+    robot: Robot,
+    given: str | Path | None,
+    file: Path | None,
+    name: str,
+    held: Callable[[Mapping[str, float]], Robot],
+    package_dirs: Sequence[str | Path] = (),
+) -> Robot:
+    """The robot with the SRDF given (`RobotError` if it is none or has joints that the robot's file lacks),
+    or else with what fits of the one beside its file, and a note on what does not. `held` makes the robot
+    with joints fixed at values, m and rad: those without a motor."""
+    path = given if given is not None else None if file is None else srdf_beside(file, name)
+    if path is None:
+        return robot
+    try:
+        srdf = read_srdf(path, robot.arguments, package_dirs)
+        robot, passive = _without_passive(robot, srdf, held)
+        semantics = _fitted(_in_robots_names(srdf, robot), robot, strict=given is not None)
+        semantics = replace(semantics, notes=(*srdf.notes, *passive, *semantics.notes))
+    except RobotError as error:
+        if given is not None:
+            raise
+        found = error.findings or (Finding("refused", {"text": str(error)}),)
+        reason = found[0].as_json()  # reading alone is strict
+        semantics = Semantics(notes=(Finding("srdf_unused", {"reason": reason}, {"srdf": Path(path).name}),))
+    notes = (*robot.notes, *semantics.notes)
+    own = robot.semantics
+    semantics = replace(
+        semantics,
+        postures=NamedPostures({**own.postures, **semantics.postures}),
+        disabled=own.disabled + semantics.disabled,
+        start=own.start,
+    )
+    return replace(robot, **robot.shapes._asdict(), semantics=semantics, notes=notes)
+
+
+def with_states(robot: Robot, states: Srdf | None, start: Mapping[str, float]) -> Robot:
+    """The robot with the postures and the start that its own file names, as an SRDF would."""
+    semantics = (
+        Semantics() if states is None else _fitted(_in_robots_names(states, robot), robot, strict=False)
+    )
+    new = robot.renamed
+    named = {new.get(name, name): value for name, value in start.items()}
+    start = _at_reference({name: value for name, value in named.items() if name in robot.q_names}, robot)
+    postures = {name: _at_reference(values, robot) for name, values in semantics.postures.items()}
+    # The file is the robot's own, no SRDF: notes are on it, too.
+    notes = tuple(replace(note, where={}) for note in semantics.notes)
+    semantics = replace(semantics, postures=NamedPostures(postures), files=(), notes=(), start=start)
+    return replace(robot, **robot.shapes._asdict(), semantics=semantics, notes=(*robot.notes, *notes))
+
+
+def _at_reference(values: Mapping[str, float], robot: Robot) -> dict[str, float]:
+    """Coordinates by name, x, y and theta of the root link given: there of the reference point."""
+    moved = next((note.values for note in robot.notes if note.code == "reference_moved"), None)
+    if moved is None or "theta" not in values:
+        return {**values}
+    x, y = moved["at"][:2]
+    cosine, sine = float(np.cos(values["theta"])), float(np.sin(values["theta"]))
+    place = {
+        "x": values["x"] + cosine * x - sine * y,
+        "y": values["y"] + sine * x + cosine * y,
+        "theta": values["theta"] + moved["yaw"],
+    }
+    return {**values, **place}
+
+
+def _without_passive(
+    robot: Robot, srdf: Srdf, held: Callable[[Mapping[str, float]], Robot]
+) -> tuple[Robot, list[Finding]]:
+    """The robot whose joints without a motor stand where they are nearest to zero, and what to tell."""
+    names = [robot.renamed.get(name, name) for name in srdf.passive]
+    free = [name for name in robot.u_names[robot.platform.p :] if name in names]
+    if not free:
+        return robot, []
+    values = {name: float(robot.rest[robot.coordinate(name)]) for name in free}
+    return held(values), [Finding("passive_held", {"values": values}, {"srdf": srdf.path.name})]
+
+
+def _in_robots_names(srdf: Srdf, robot: Robot) -> Srdf:
+    """The same, with the robot's names of joints and links that are called otherwise in its file."""
+    new = robot.renamed
+    if not new:
+        return srdf
+
+    def named(names: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(new.get(name, name) for name in names)
+
+    states = {
+        name: {new.get(joint, joint): values for joint, values in state.items()}
+        for name, state in srdf.states.items()
+    }
+    groups = {
+        name: Group(named(one.joints), named(one.links), one.groups, tuple(map(named, one.chains)))  # type: ignore[arg-type]  # pairs
+        for name, one in srdf.groups.items()
+    }
+    pairs = {"disabled": srdf.disabled, "enabled": srdf.enabled}
+    return srdf._replace(
+        states=states,
+        groups=groups,
+        untouched=named(srdf.untouched),
+        passive=named(srdf.passive),
+        **{key: tuple(map(named, of_key)) for key, of_key in pairs.items()},  # type: ignore[arg-type]  # pairs
+    )
+
+
+def disabled_pairs(srdf: Srdf, robot: Robot) -> tuple[tuple[str, str], ...]:
+    """The pairs of the robot's links that may touch: those disabled, and of links that may touch all others
+    those that are not enabled."""
+    links = {frame.name for frame in robot.model.frames if frame.type == pin.FrameType.BODY}
+    shapes = robot.shapes.collision_model.geometryObjects
+    solid = sorted({str(robot.model.frames[shape.parentFrame].name) for shape in shapes})
+    enabled = {frozenset(pair) for pair in srdf.enabled}
+    pairs = ((one, other) for one in srdf.untouched for other in solid)
+    free = (pair for pair in pairs if len({*pair}) == 2 and frozenset(pair) not in enabled)
+    found = dict.fromkeys(pair for pair in (*srdf.disabled, *free) if links.issuperset(pair))
+    return tuple(found)
+
+
+def _fitted(srdf: Srdf, robot: Robot, *, strict: bool) -> Semantics:
+    known = _joints(robot)
+    base = _base(srdf, robot)
+    roots = {_ROOT, *(one.name for one in srdf.roots)} - known
+    notes: list[Finding] = []
+    postures = NamedPostures()
+    for name, state in srdf.states.items():
+        strange = [joint for joint in state if joint not in known | roots]
+        if strange and strict:
+            where = f"srdf: {srdf.path}: state {name}"
+            expect_known("joint", strange[0], sorted(known), where, RobotError)
+        if strange:
+            notes.append(_note("posture_joints_unknown", posture=name, names=strange))
+        if replaced := [joint for joint in state if joint in base and joint in known]:
+            notes.append(_note("posture_of_base", posture=name, names=replaced))
+        named = _coordinates(state, roots, robot, name, notes)
+        if named:
+            postures[name] = named
+        if beyond := _beyond(named, robot):
+            notes.append(_note("posture_beyond", posture=name, beyond=beyond))
+    groups = _groups(srdf.groups, robot, base)
+    if still := [name for name in srdf.groups if name not in groups]:
+        notes.append(_note("groups_without_inputs", names=still))
+    parts = {*robot.frames, *known, *roots}
+    if strange := [*dict.fromkeys(one for one in _members_named(srdf) if one not in parts)]:
+        notes.append(_note("srdf_names_unknown", names=strange))
+    notes += _root_notes(srdf, robot)
+    of_file = tuple(replace(note, where={"srdf": srdf.path.name}) for note in notes)
+    groups = _free_names(groups, robot)
+    return Semantics(postures, groups, disabled_pairs(srdf, robot), (srdf.path,), of_file)
+
+
+def _members_named(srdf: Srdf) -> Iterator[str]:
+    """Every link, joint and group that the file speaks of outside its states."""
+    for group in srdf.groups.values():
+        yield from (*group.joints, *group.links, *chain(*group.chains))
+        yield from (name for name in group.groups if name not in srdf.groups)
+    yield from chain(*srdf.disabled, *srdf.enabled, srdf.untouched, srdf.passive)
+
+
+def _root_notes(srdf: Srdf, robot: Robot) -> Iterator[Finding]:
+    """On virtual joints that the robot does not have: elsewhere than at its root, or on another platform."""
+    for root in srdf.roots:
+        if root.child and not _is_of_root(root.child, robot):
+            yield _note("virtual_joint_unused", name=root.name, child=root.child)
+        elif root.kind == "planar" and root.motion and robot.platform.coordinates:
+            slides = bool(np.any(robot.platform.G(np.zeros(robot.platform.n_p))[1]))
+            if slides != (root.motion == "holonomic"):
+                about = {"name": root.name, "model": root.motion, "platform": robot.platform.name}
+                yield _note("motion_model_differs", **about)
+
+
+def _is_of_root(link: str, robot: Robot) -> bool:
+    model = robot.model
+    root = model.getJointId("theta") if robot.platform.coordinates else 0
+    return link in robot.frames and int(model.frames[robot.frame_id(link)].parentJoint) == root
+
+
+def _base(srdf: Srdf, robot: Robot) -> set[str]:
+    """The joints that mean the platform: those of the file that x, y, theta stand for, virtual ones, and then
+    the joint of the root link."""
+    if not robot.platform.coordinates:
+        return set()
+    replaced = {note.values["name"] for note in robot.notes if note.code == "root_replaced"}
+    base = {*provenance_of(robot).base, *replaced}
+    base |= {one.name for one in srdf.roots if one.kind != "fixed" and _is_of_root(one.child, robot)}
+    return {*base, "theta"} if base else base
+
+
+def _joints(robot: Robot) -> set[str]:
+    """Every joint of the robot's file: coordinates, wheels, and fixed ones."""
+    both = (*robot.model.frames, *robot.display_model.frames)
+    return {frame.name for frame in both if frame.type in _JOINTS} - {"universe"}
+
+
+def _coordinates(
+    state: Mapping[str, tuple[float, ...]], roots: set[str], robot: Robot, name: str, notes: list[Finding]
+) -> dict[str, float]:
+    """The coordinates that a state sets, m and rad: no wheels, locked or mimic joints."""
+    still = robot.locked
+    values: dict[str, float] = {}
+    for joint, numbers in state.items():
+        if joint in roots:
+            values |= _place(numbers, robot)
+        elif joint in robot.q_names or joint in still:
+            if len(numbers) != 1:
+                notes.append(_note("posture_not_one_number", posture=name, name=joint, count=len(numbers)))
+            elif joint in robot.q_names:
+                values[joint] = -numbers[0] if joint in robot.reversed_joints else numbers[0]
+            elif abs(numbers[0] - still[joint]) > _SLACK:
+                about = {"posture": name, "name": joint, "locked": still[joint], "wanted": numbers[0]}
+                notes.append(_note("posture_locked", **about))
+    for one in robot.mimic_joints:
+        if one.joint not in values:
+            continue
+        wanted = values.pop(one.joint)
+        if one.leader not in values and one.multiplier:
+            values[one.leader] = (wanted - one.offset) / one.multiplier
+        elif one.leader in values and abs(one.value(values[one.leader]) - wanted) > _SLACK:
+            about = {"posture": name, "name": one.joint, "leader": one.leader, "mimic": str(one)}
+            notes.append(_note("posture_follows", **about, wanted=wanted))
+    return values
+
+
+def _beyond(values: Mapping[str, float], robot: Robot) -> dict[str, list[float]]:
+    """The coordinates that a state sets beyond their limits: value and limits."""
+    far = {}
+    for joint, value in values.items():
+        lower, upper = map(float, robot.q_limits[robot.coordinate(joint)])
+        if not lower - _SLACK <= value <= upper + _SLACK:
+            far[joint] = [value, lower, upper]
+    return far
+
+
+def _note(code: str, **values: object) -> Finding:
+    return Finding(code, values)
+
+
+def _place(numbers: Sequence[float], robot: Robot) -> dict[str, float]:
+    """x, y, theta from what an SRDF gives the joint below the world: planar, or free with a quaternion."""
+    if not {"x", "y", "theta"} <= {*robot.q_names}:
+        return {}
+    match numbers:
+        case x, y, _, qx, qy, qz, qw:
+            turn = np.arctan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
+        case x, y, cosine, sine:
+            turn = np.arctan2(sine, cosine)
+        case x, y, turn:
+            pass
+        case _:
+            return {}
+    return {"x": x, "y": y, "theta": float(turn)}
+
+
+def _groups(groups: Mapping[str, Group], robot: Robot, base: set[str]) -> dict[str, tuple[str, ...]]:
+    """The inputs of each group that has some: of the platform all for a joint of its base."""
+    found = {}
+    for name in groups:
+        joints = _members(name, groups, robot, ())
+        inputs = tuple(
+            one
+            for k, (one, i) in enumerate(zip(robot.u_names, robot.rate_coordinates, strict=True))
+            if (i >= 0 and robot.q_names[i] in joints) or (k < robot.platform.p and base & joints)
+        )
+        if inputs:
+            found[name] = inputs
+    return found
+
+
+def _free_names(groups: Mapping[str, tuple[str, ...]], robot: Robot) -> dict[str, tuple[str, ...]]:
+    """The groups under names that are not taken."""
+    taken = {*robot.groups, *robot.u_names}
+    found = {}
+    for name, inputs in groups.items():
+        key, count = name, 0
+        while key in taken:
+            count += 1
+            key = f"{name}_{count}"
+        taken.add(key)
+        found[key] = inputs
+    return found
+
+
+def _members(name: str, groups: Mapping[str, Group], robot: Robot, above: tuple[str, ...]) -> set[str]:
+    """The joints of a group, fixed ones too; none for an unknown or circular one. A link stands for the joint
+    that carries it, a chain for the joints between its links."""
+    if name in above or name not in groups:
+        return set()
+    group = groups[name]
+    return {*group.joints}.union(
+        *(_above(robot, link)[:1] for link in group.links),
+        *(
+            {*_above(robot, tip)} ^ {*_above(robot, base)}
+            for base, tip in group.chains
+            if {base, tip} <= {*robot.frames}
+        ),
+        *(_members(one, groups, robot, (*above, name)) for one in group.groups),
+    )
+
+
+def _above(robot: Robot, link: str) -> list[str]:
+    """The joints from a link to the root, fixed ones too."""
+    found: list[str] = []
+    frames = robot.model.frames
+    index = robot.frame_id(link) if link in robot.frames else 0
+    while index:
+        if frames[index].type in _JOINTS:
+            found.append(frames[index].name)
+        index = int(frames[index].parentFrame)
+    return found

@@ -1,0 +1,154 @@
+"""Where a robot goes while its inputs are held, and where its platform gets by rolling on."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import allocating, call_platform, checked_by_caller, clear, compiled, scratch
+from nmm.base.kernels.linear_algebra import copied
+from nmm.base.kernels.record_layout import IntegerVector, Memory, Vector, views
+from nmm.base.kernels.velocity_map import place_mimic_joints
+from nmm.model.robots.robot import Robot
+
+
+class Inputs(NamedTuple):
+    """What a robot's inputs move: the platform's first `coordinates` by its kernel, qp_dot = G(qp) up, and
+    `parameters`; the coordinates `moved` (m - p,) by the arm's; `mimic_joints` (4 k,) as in
+    `nmm.base.kernels.velocity_map`."""
+
+    platform: int
+    parameters: Vector
+    coordinates: int
+    moved: IntegerVector
+    mimic_joints: Vector
+
+
+@compiled
+def hold(inputs: Inputs, q: Array, u: Array, dt: float, ahead: Array) -> None:
+    """ahead (n,): q after dt with u held constant; RK4 on the platform's part, the joints' is exact."""
+    hold_rates(inputs, q, u, scratch(0), dt, ahead)
+
+
+@compiled
+def hold_rates(inputs: Inputs, q: Array, u: Array, u_dot: Array, dt: float, ahead: Array) -> None:
+    """As `hold`, with u_dot (m,) held constant, from u on; (0,) for inputs that are constant."""
+    n_p, p = inputs.coordinates, u.shape[0] - inputs.moved.shape[0]
+    G, G_q, stage, slope = scratch((n_p, p)), scratch((n_p, p, n_p)), scratch(n_p), scratch(n_p)
+    copied(q, ahead)
+    for k in range(4):
+        for i in range(n_p):
+            stage[i] = q[i] + (0.0 if k == 0 else (dt if k == 3 else 0.5 * dt) * slope[i])
+        later = 0.0 if k == 0 else (dt if k == 3 else 0.5 * dt)
+        clear(G)
+        clear(G_q)
+        call_platform(inputs.platform, stage, inputs.parameters, G, G_q)
+        for i in range(n_p):
+            slope[i] = 0.0
+            for j in range(p):
+                rate = u[j] + later * u_dot[j] if u_dot.shape[0] > 0 else u[j]
+                slope[i] += G[i, j] * rate
+            ahead[i] += dt * slope[i] / (6.0 if k == 0 or k == 3 else 3.0)
+    for j in range(inputs.moved.shape[0]):
+        ahead[inputs.moved[j]] += dt * u[p + j]
+        if u_dot.shape[0] > 0:
+            ahead[inputs.moved[j]] += 0.5 * dt * dt * u_dot[p + j]
+    place_mimic_joints(ahead, inputs.mimic_joints)
+
+
+@compiled
+def _hold(
+    integers: Integers, floats: Array, q: Array, u: Array, u_dot: Array, dt: float, ahead: Array
+) -> None:
+    hold_rates(views(Inputs, integers, floats, 0), q, u, u_dot, dt, ahead)
+
+
+_FLAT = types.float64[::1]
+_HOLD = types.void(types.int64[::1], _FLAT, _FLAT, _FLAT, _FLAT, types.float64, _FLAT)
+#: Of inputs that are constant.
+NO_RATES = np.zeros(0)
+
+
+def inputs_of(robot: Robot) -> Inputs:
+    platform = robot.platform
+    return Inputs(
+        platform.velocity_map.address,
+        platform.parameters,
+        platform.n_p,
+        robot.arm_coordinates,
+        robot.following.table.ravel(),
+    )
+
+
+class HeldInputs:
+    def __init__(self, robot: Robot) -> None:
+        memory = Memory()
+        memory.add(inputs_of(robot))
+        self._blocks = memory.blocks()
+        self._hold = checked_by_caller(_hold, _HOLD)
+
+    def __call__(self, q: Array, u: Array, dt: float, u_dot: Array = NO_RATES) -> Array:
+        """q (n,) after dt, s, with the inputs u (m,), or with u_dot (m,) from u on."""
+        q = np.ascontiguousarray(q, dtype=np.float64)
+        u = np.ascontiguousarray(u, dtype=np.float64)
+        ahead = np.empty_like(q)
+        self._hold(*self._blocks, q, u, u_dot, dt, ahead)
+        return ahead
+
+
+#: Steps of RK4 on the way; a unicycle's straight line and a turn of 90° come out to 1e-4 of the way.
+STEPS = 4
+
+
+@allocating
+def roll(
+    kernel: int, parameters: Array, n_p: int, p: int, q: Array, up: Array, way: float, steps: int
+) -> tuple[Array, Array]:
+    """qp (n_p,) after a way along G(qp) up by RK4, and its derivative (n_p, n_p) in the qp of the start."""
+    at, D = q[:n_p].copy(), np.eye(n_p)
+    G, G_q = np.zeros((n_p, p)), np.zeros((n_p, p, n_p))
+    slope, slopes = np.zeros(n_p), np.zeros((n_p, n_p))
+    h = way / steps
+    for _ in range(steps):
+        first, first_D = at.copy(), D.copy()
+        for k in range(4):
+            part = 0.0 if k == 0 else h if k == 3 else 0.5 * h
+            stage, stage_D = first + part * slope, first_D + part * slopes
+            G[:] = 0.0
+            G_q[:] = 0.0
+            call_platform(kernel, stage, parameters, G, G_q)
+            for i in range(n_p):
+                slope[i] = 0.0
+                slopes[i] = 0.0
+                for j in range(p):
+                    slope[i] += G[i, j] * up[j]
+                    for a in range(n_p):
+                        for c in range(n_p):
+                            slopes[i, c] += G_q[i, j, a] * up[j] * stage_D[a, c]
+            share = h / (6.0 if k == 0 or k == 3 else 3.0)
+            at += share * slope
+            D += share * slopes
+    return at, D
+
+
+class RollingPreview:
+    """The configuration after the platform has rolled on with its steering as it is.
+    up (p,) : the smallest inputs that roll it on by 1 m at coordinates 0
+    rolls : whether it has to roll to turn (a car, not a unicycle nor what moves sideways)"""
+
+    def __init__(self, robot: Robot) -> None:
+        platform = robot.platform
+        self._platform = (platform.velocity_map.address, platform.parameters, platform.n_p, platform.p)
+        self.up, self.rolls = np.zeros(platform.p), False
+        if platform.n_p >= 3:
+            body = platform.G(np.zeros(platform.n_p))[:3]
+            self.up = np.linalg.pinv(body) @ [1.0, 0.0, 0.0]
+            self.rolls = bool(np.linalg.matrix_rank(body) == 1)
+
+    def __call__(self, q: Array, way: float) -> tuple[Array, Array]:
+        """q (n,) after a way, m, and the derivative (n_p, n_p) of its platform coordinates in those of q."""
+        n_p = self._platform[2]
+        ahead = q.copy()
+        ahead[:n_p], derivative = roll(*self._platform, q, self.up, way, STEPS)
+        return ahead, derivative

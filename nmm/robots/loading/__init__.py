@@ -1,7 +1,0 @@
-"""Loading robots: from a bundled name, a URDF or xacro file, or a Pinocchio model."""
-
-from nmm.robots.loading.load import load as load
-from nmm.robots.loading.mount import mount as mount
-from nmm.robots.loading.pinocchio_layout import PinocchioLayout as PinocchioLayout
-from nmm.robots.loading.pinocchio_layout import pinocchio_model as pinocchio_model
-from nmm.robots.loading.pinocchio_layout import pinocchio_models as pinocchio_models
