@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 import nmm
-from nmm.functions.tasks.depth_estimate import DepthEstimate
+from nmm.control.functions.tasks.depth_estimate import DepthEstimate
 
 Array = np.ndarray
 PIXELS, SIZE = [525.0, 525.0, 319.5, 239.5], np.array([640.0, 480.0])

@@ -21,7 +21,7 @@ import numpy as np
 import pinocchio as pin
 
 import nmm
-from nmm.functions.program import Program
+from nmm.control.functions.program import Program
 
 #: Where a coordinate has no limit, m or rad: URDF wants one of every joint but those called continuous.
 ENDLESS = 1e4

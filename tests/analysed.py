@@ -5,10 +5,10 @@ from __future__ import annotations
 import twin
 
 from nmm.control.controller import Controller
-from nmm.functions.references import Bearing
-from nmm.functions.tasks import Heading, LinearCoordinates, Position, Task
+from nmm.control.functions.references import Bearing
+from nmm.control.functions.tasks import Heading, LinearCoordinates, Position, Task
+from nmm.control.resolvers import ExtendedJacobian
 from nmm.model.robots.robot import Robot
-from nmm.resolvers import ExtendedJacobian
 
 TIP = Task(Position("ee", "xy"), [0.0, 0.0])
 TIP_3D = Task(Position("ee", "xyz"), [0.0, 0.0, 0.0])

@@ -9,9 +9,9 @@ from function_grid import evaluated
 from numpy.typing import NDArray
 
 from nmm.control.controller import Controller
-from nmm.functions.function import Function
-from nmm.functions.objectives import Objective
-from nmm.functions.program import Program
+from nmm.control.functions.function import Function
+from nmm.control.functions.objectives import Objective
+from nmm.control.functions.program import Program
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
 

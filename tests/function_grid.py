@@ -18,8 +18,8 @@ from numpy import pi
 from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
-from nmm.functions.function import Evaluation, Function
-from nmm.functions.objectives import (
+from nmm.control.functions.function import Evaluation, Function
+from nmm.control.functions.objectives import (
     Alignment,
     CallableObjective,
     DirectionalManipulability,
@@ -35,9 +35,9 @@ from nmm.functions.objectives import (
     Sum,
     WeightedManipulability,
 )
-from nmm.functions.objectives.base import Product
-from nmm.functions.program import evaluate
-from nmm.functions.references import (
+from nmm.control.functions.objectives.base import Product
+from nmm.control.functions.program import evaluate
+from nmm.control.functions.references import (
     Bearing,
     CallableReference,
     Circle,
@@ -52,8 +52,8 @@ from nmm.functions.references import (
     SteadyTurn,
     VelocityOf,
 )
-from nmm.functions.references.live_target import Displaced
-from nmm.functions.tasks import (
+from nmm.control.functions.references.live_target import Displaced
+from nmm.control.functions.tasks import (
     CallableFunction,
     CenterOfMass,
     Distance,

@@ -16,7 +16,7 @@ from scipy.optimize import linprog
 
 import nmm
 from nmm.base.arrays import Array
-from nmm.resolvers.problem import Problem
+from nmm.control.resolvers.problem import Problem
 
 #: (rows of each level, inputs, rows of limits)
 SIZES = (((1, 1, 1), 5, 3), ((2, 1, 2), 8, 4), ((3, 3, 2), 10, 8), ((3, 2, 3), 12, 6))

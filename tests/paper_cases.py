@@ -12,11 +12,11 @@ from numpy import pi
 from numpy.typing import NDArray
 
 from nmm.control.controller import Controller
-from nmm.functions.objectives import Objective, Quadratic, QuadraticTerm
-from nmm.functions.references import Bearing, Circle
-from nmm.functions.tasks import Heading, Position, Task
+from nmm.control.functions.objectives import Objective, Quadratic, QuadraticTerm
+from nmm.control.functions.references import Bearing, Circle
+from nmm.control.functions.tasks import Heading, Position, Task
+from nmm.control.resolvers import ProjectedGradient, ReducedGradient, Resolver
 from nmm.model.robots.robot import Robot
-from nmm.resolvers import ProjectedGradient, ReducedGradient, Resolver
 
 Array = NDArray[np.float64]
 

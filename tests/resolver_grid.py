@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 
 from nmm.base.kinds import RESOLVERS
-from nmm.resolvers import Resolver
+from nmm.control.resolvers import Resolver
 
 
 def every_resolver(**wanted: object) -> dict[str, Resolver]:

@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 import nmm
-from nmm.functions.references import Circle
+from nmm.control.functions.references import Circle
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading.packages import Packages
 from nmm.model.robots.robot import Robot

@@ -14,9 +14,9 @@ from paper_cases import CIRCLE
 
 from nmm.analysis.formulas import SymbolicAnalysis, symbolic
 from nmm.analysis.singular.jacobians import Jacobians, stacked
-from nmm.functions.program import evaluate
-from nmm.functions.references import Bearing
-from nmm.functions.tasks import Heading, Position, Task
+from nmm.control.functions.program import evaluate
+from nmm.control.functions.references import Bearing
+from nmm.control.functions.tasks import Heading, Position, Task
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot

@@ -12,10 +12,10 @@ from paper_cases import CASES
 from nmm.analysis import analyse, analyse_along
 from nmm.base.errors import InputError
 from nmm.control.controller import Controller
-from nmm.functions.tasks import Position
+from nmm.control.functions.tasks import Position
+from nmm.control.resolvers import ProjectedGradient
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot
-from nmm.resolvers import ProjectedGradient
 from nmm.runs.simulation import simulate
 
 Array = NDArray[np.float64]

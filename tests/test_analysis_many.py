@@ -16,7 +16,7 @@ from nmm.analysis.maps.workspace import workspace_map
 from nmm.analysis.singular.jacobians import Jacobians
 from nmm.base import cores
 from nmm.base.kernels.spectra import FEW_ROWS, SIDE_BY_SIDE, spectra, write_spectrum
-from nmm.functions.tasks import CallableFunction, Pose, Position
+from nmm.control.functions.tasks import CallableFunction, Pose, Position
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
 

@@ -14,9 +14,9 @@ from nmm.analysis.maps.coordinates import singularity_map
 from nmm.analysis.maps.singular_set import SingularSet
 from nmm.analysis.maps.workspace import workspace_map
 from nmm.base.errors import InputError
+from nmm.control.functions.tasks import Heading, Position
 from nmm.figures.maps import thinned
 from nmm.folders.map import is_map
-from nmm.functions.tasks import Heading, Position
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot

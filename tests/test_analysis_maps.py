@@ -15,7 +15,7 @@ from nmm.analysis import analyse
 from nmm.analysis.maps.coordinates import singularity_map
 from nmm.analysis.maps.measures import MEASURES, spectra_of
 from nmm.analysis.maps.singular_set import SingularSet
-from nmm.functions.tasks import Heading, Pose, Position
+from nmm.control.functions.tasks import Heading, Pose, Position
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot

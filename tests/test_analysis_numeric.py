@@ -17,10 +17,10 @@ from nmm.analysis import SingularityReport, analyse
 from nmm.base.errors import InputError, SingularError
 from nmm.control.controller import Controller
 from nmm.control.directions import direction_text, readable_basis
-from nmm.functions.tasks import LinearCoordinates, Pose, Position, Task
+from nmm.control.functions.tasks import LinearCoordinates, Pose, Position, Task
+from nmm.control.resolvers import ReducedGradient
 from nmm.model.robots.loading import load, mount
 from nmm.model.robots.robot import Robot
-from nmm.resolvers import ReducedGradient
 
 Array = NDArray[np.float64]
 

@@ -14,13 +14,13 @@ from nmm.analysis.redundancy.report import RedundancyReport, redundancy
 from nmm.analysis.singular.parts import null_space
 from nmm.base.errors import InputError, SingularError
 from nmm.control.controller import Controller
-from nmm.functions.function import Function
-from nmm.functions.references import Bearing
-from nmm.functions.tasks import Heading, Pose, Position, Task
+from nmm.control.functions.function import Function
+from nmm.control.functions.references import Bearing
+from nmm.control.functions.tasks import Heading, Pose, Position, Task
+from nmm.control.resolvers import ProjectedGradient
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading import load, mount
 from nmm.model.robots.robot import Robot
-from nmm.resolvers import ProjectedGradient
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from robot_grid import ARMS
 
 import nmm
 from nmm.analysis import analyse, analyse_along, find_singularities, redundancy
+from nmm.control.resolvers import Status
 from nmm.model.robots.robot import Robot
-from nmm.resolvers import Status
 
 STRETCHED_UP = [0.7, -pi / 2, 0.0, -pi / 2, 0.0, 0.0]
 

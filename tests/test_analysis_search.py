@@ -18,7 +18,7 @@ from nmm.analysis.search.family import SingularFamily
 from nmm.analysis.search.many_starts import SingularitySearch, find_singularities
 from nmm.analysis.search.nearest import nearest_singularity
 from nmm.base.errors import InputError, SingularError
-from nmm.functions.tasks import CallableFunction, Heading, Pose, Position, Posture
+from nmm.control.functions.tasks import CallableFunction, Heading, Pose, Position, Posture
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot
 from nmm.scenario import Scenario

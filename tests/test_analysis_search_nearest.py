@@ -16,7 +16,7 @@ from nmm.analysis.search.nearest import nearest_singularity
 from nmm.base.text_format import value_text
 from nmm.cli.singularity_options import search_command, show_nearest, show_search
 from nmm.cli.subjects import studied
-from nmm.functions.tasks import CallableFunction, Position
+from nmm.control.functions.tasks import CallableFunction, Position
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot
 

@@ -16,7 +16,7 @@ from nmm.analysis import analyse
 from nmm.analysis.search.family import SingularFamily
 from nmm.analysis.search.many_starts import SingularitySearch, find_singularities
 from nmm.analysis.search.nearest import nearest_singularity
-from nmm.functions.tasks import Pose
+from nmm.control.functions.tasks import Pose
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot
 

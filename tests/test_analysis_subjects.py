@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from nmm.analysis import analyse
 from nmm.analysis.singular.jacobians import Jacobians
 from nmm.base.errors import InputError
-from nmm.functions.program import evaluate
-from nmm.functions.tasks import Heading, Orientation, Pose, Position, Task
+from nmm.control.functions.program import evaluate
+from nmm.control.functions.tasks import Heading, Orientation, Pose, Position, Task
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot
@@ -22,7 +22,11 @@ Array = NDArray[np.float64]
 
 def subtracted() -> list[Entry]:
     """Tasks whose error is a difference; the others' rows are those of their error, tested below."""
-    tasks = [entry for entry in ENTRIES if type(entry.function).__module__.startswith("nmm.functions.tasks")]
+    tasks = [
+        entry
+        for entry in ENTRIES
+        if type(entry.function).__module__.startswith("nmm.control.functions.tasks")
+    ]
     return [entry for entry in tasks if entry.function.comparison is None]
 
 

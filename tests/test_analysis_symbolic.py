@@ -16,7 +16,7 @@ from nmm.analysis.formulas import symbolic
 from nmm.analysis.formulas.expressions import shown
 from nmm.analysis.formulas.symbolic_analysis import latex_lines
 from nmm.base.errors import InputError
-from nmm.functions.tasks import Distance, Orientation, Pointing, Position
+from nmm.control.functions.tasks import Distance, Orientation, Pointing, Position
 from nmm.model.platforms import DifferentialDrive
 from nmm.model.robots.loading import load
 

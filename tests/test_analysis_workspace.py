@@ -17,7 +17,7 @@ from nmm.analysis.maps.search import BENT
 from nmm.analysis.maps.workspace import in_curves, workspace_map
 from nmm.analysis.singular.jacobians import Jacobians
 from nmm.base.errors import InputError
-from nmm.functions.tasks import Position
+from nmm.control.functions.tasks import Position
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 import nmm
 from nmm.base.kernels.record_layout import Memory, views
-from nmm.resolvers.answer import Answer, AnswerArrays, unanswered
-from nmm.resolvers.base import ANSWER, resolve_one
-from nmm.resolvers.problem import Problem
-from nmm.resolvers.problem_arrays import LOWER, UPPER
+from nmm.control.resolvers.answer import Answer, AnswerArrays, unanswered
+from nmm.control.resolvers.base import ANSWER, resolve_one
+from nmm.control.resolvers.problem import Problem
+from nmm.control.resolvers.problem_arrays import LOWER, UPPER
 
 Array = NDArray[np.float64]
 

@@ -10,10 +10,10 @@ import pytest
 from findings import codes, the
 
 import nmm
-import nmm.functions.objectives
-import nmm.functions.references
-import nmm.functions.tasks
-import nmm.resolvers
+import nmm.control.functions.objectives
+import nmm.control.functions.references
+import nmm.control.functions.tasks
+import nmm.control.resolvers
 from nmm import Scenario
 from nmm.analysis import analyse_along
 from nmm.base.bundled import bundled_scenarios

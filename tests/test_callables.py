@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 import nmm
 from nmm import Configuration
-from nmm.functions.program import evaluate
+from nmm.control.functions.program import evaluate
 from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from findings import refused
 import nmm
 from nmm import Scenario
 from nmm.base.errors import ScenarioError
-from nmm.functions.program import Program
+from nmm.control.functions.program import Program
 from nmm.model.collisions.pairs import random_configurations
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.zero_order_hold import HeldInputs, RollingPreview

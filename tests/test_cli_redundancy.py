@@ -19,7 +19,7 @@ from nmm.analysis.redundancy.moving import self_motion
 from nmm.analysis.redundancy.report import redundancy as report_of
 from nmm.base.errors import InputError, SingularError
 from nmm.cli.redundancy import direction_of, laps, redundancy
-from nmm.functions.tasks import Position
+from nmm.control.functions.tasks import Position
 
 BENT = ["theta=0.3", "q1=0.4", "q2=0.7"]
 ROUND = "{kind: circle, center: [1.2, 0.2], radius: 0.1, rate: pi}"

@@ -16,7 +16,7 @@ from urdf_parts import AXIS, LIMIT, inertial, joint, link, robot, shape, write
 import nmm
 from nmm.base.bundled import bundled_robots
 from nmm.cli.exit_status import status_of
-from nmm.control.idle_inputs import inputs_without_effect
+from nmm.control.step.idle_inputs import inputs_without_effect
 
 Command = Callable[..., Result]
 

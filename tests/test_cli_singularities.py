@@ -20,7 +20,7 @@ from nmm import Scenario
 from nmm.analysis import analyse, analyse_along
 from nmm.base.findings import Finding
 from nmm.cli.exit_status import status_of
-from nmm.functions.tasks import Heading, Position
+from nmm.control.functions.tasks import Heading, Position
 from nmm.model.robots.loading import load
 from nmm.runs.trajectory import Trajectory
 

@@ -16,7 +16,7 @@ from spatial_arms import load_ur5
 from nmm.analysis import analyse
 from nmm.analysis.formulas.zeros import Limits
 from nmm.cli.exit_status import status_of
-from nmm.functions.tasks import Pose, Position
+from nmm.control.functions.tasks import Pose, Position
 from nmm.model.robots.loading import load
 
 Command = Callable[..., Result]

@@ -24,16 +24,12 @@ from nmm.base.kernels.compiled import Kernel
 from nmm.base.kernels.record_layout import Memory, views
 from nmm.base.kernels.records import At, Frames, Rows
 from nmm.control.controller import Controller
-from nmm.control.equations import step
-from nmm.functions.function import Stage
-from nmm.functions.objectives import Sum
-from nmm.functions.program import Program, evaluate
-from nmm.functions.tasks import LinearCoordinates, Task
-from nmm.functions.tasks.task import Comparison
-from nmm.model.robots.configuration import Configuration
-from nmm.model.robots.loading import load
-from nmm.model.robots.robot import CENTER_OF_MASS, Robot
-from nmm.resolvers import (
+from nmm.control.functions.function import Stage
+from nmm.control.functions.objectives import Sum
+from nmm.control.functions.program import Program, evaluate
+from nmm.control.functions.tasks import LinearCoordinates, Task
+from nmm.control.functions.tasks.task import Comparison
+from nmm.control.resolvers import (
     CallableResolver,
     DampedLeastSquares,
     ExtendedJacobian,
@@ -42,9 +38,13 @@ from nmm.resolvers import (
     ReducedGradient,
     Resolver,
 )
-from nmm.resolvers.answer import SINGULAR_J, SOLVED, AnswerArrays, unanswered
-from nmm.resolvers.base import ANSWER, resolve_one
-from nmm.resolvers.saturation import limit
+from nmm.control.resolvers.answer import SINGULAR_J, SOLVED, AnswerArrays, unanswered
+from nmm.control.resolvers.base import ANSWER, resolve_one
+from nmm.control.resolvers.saturation import limit
+from nmm.control.step.equations import step
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading import load
+from nmm.model.robots.robot import CENTER_OF_MASS, Robot
 
 Array = NDArray[np.float64]
 
@@ -332,7 +332,7 @@ def test_another_process_compiles_nothing(tmp_path: Path) -> None:
     counts = json.loads((tmp_path / "cache.json").read_text())
     assert {name for name, (_, misses) in counts.items() if misses} == set()
     assert sum(hits > 0 for hits, _ in counts.values()) > len(kernels())
-    assert counts["nmm.control.equations.step"] == [1, 0]
+    assert counts["nmm.control.step.equations.step"] == [1, 0]
 
 
 def test_a_new_controller_compiles_nothing(robot_2r: Robot, robot_3r: Robot) -> None:

@@ -13,7 +13,7 @@ from findings import codes
 
 import nmm
 from nmm.base.kernels.compiled import Kernel
-from nmm.control.step_size import StepSize
+from nmm.control.step.step_size import StepSize
 from nmm.runs import closed_loop
 from nmm.runs.compiled_loop import CompiledLoop
 

@@ -12,12 +12,12 @@ from paper_cases import CASES, CIRCLE, TIP, Case
 from platform_grid import EXAMPLES, random_qp
 
 from nmm.control.controller import Controller
-from nmm.functions.objectives import Objective, Quadratic, QuadraticTerm
-from nmm.functions.references import Bearing, Circle, Constant, Line
-from nmm.functions.tasks import Heading, LinearCoordinates, Position, Task
+from nmm.control.functions.objectives import Objective, Quadratic, QuadraticTerm
+from nmm.control.functions.references import Bearing, Circle, Constant, Line
+from nmm.control.functions.tasks import Heading, LinearCoordinates, Position, Task
+from nmm.control.resolvers import ExtendedJacobian, ProjectedGradient, ReducedGradient, Resolver, Status
 from nmm.model.platforms import WheeledPlatform
 from nmm.model.robots.robot import Robot
-from nmm.resolvers import ExtendedJacobian, ProjectedGradient, ReducedGradient, Resolver, Status
 
 Array = NDArray[np.float64]
 

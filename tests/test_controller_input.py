@@ -14,7 +14,7 @@ from paper_cases import CIRCLE, H1, TIP
 
 from nmm.base.errors import InputError, NmmError, SingularError
 from nmm.control.controller import Controller
-from nmm.functions.objectives import (
+from nmm.control.functions.objectives import (
     CallableObjective,
     JointRange,
     Manipulability,
@@ -22,13 +22,17 @@ from nmm.functions.objectives import (
     QuadraticTerm,
     Sum,
 )
-from nmm.functions.program import evaluate
-from nmm.functions.references import Bearing, CallableReference, Circle, Constant, PiecewisePolynomial, Spline
-from nmm.functions.tasks import CallableFunction, Heading, LinearCoordinates, Position, Task
-from nmm.model.robots.configuration import Configuration
-from nmm.model.robots.loading import load
-from nmm.model.robots.robot import Robot
-from nmm.resolvers import (
+from nmm.control.functions.program import evaluate
+from nmm.control.functions.references import (
+    Bearing,
+    CallableReference,
+    Circle,
+    Constant,
+    PiecewisePolynomial,
+    Spline,
+)
+from nmm.control.functions.tasks import CallableFunction, Heading, LinearCoordinates, Position, Task
+from nmm.control.resolvers import (
     CallableResolver,
     ExtendedJacobian,
     ProjectedGradient,
@@ -36,6 +40,9 @@ from nmm.resolvers import (
     Resolver,
     Status,
 )
+from nmm.model.robots.configuration import Configuration
+from nmm.model.robots.loading import load
+from nmm.model.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

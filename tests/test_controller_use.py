@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from paper_cases import CASES, TIP, Case
 
 from nmm.control.controller import Controller
-from nmm.control.equations import step
-from nmm.functions.objectives import CallableObjective, Objective
-from nmm.functions.program import evaluate
-from nmm.functions.references import CallableReference
-from nmm.functions.tasks import CallableFunction, Task
+from nmm.control.functions.objectives import CallableObjective, Objective
+from nmm.control.functions.program import evaluate
+from nmm.control.functions.references import CallableReference
+from nmm.control.functions.tasks import CallableFunction, Task
+from nmm.control.resolvers import CallableResolver, Problem, ProjectedGradient, ReducedGradient
+from nmm.control.step.equations import step
 from nmm.model.robots.robot import Robot
-from nmm.resolvers import CallableResolver, Problem, ProjectedGradient, ReducedGradient
 
 Array = NDArray[np.float64]
 

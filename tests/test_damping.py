@@ -12,7 +12,7 @@ from conditioned import Array, each_shape, with_condition, with_singular_values
 from findings import refused
 
 from nmm.base.kernels.linear_algebra import singular_rows
-from nmm.resolvers import (
+from nmm.control.resolvers import (
     DampedLeastSquares,
     ExtendedJacobian,
     Problem,
@@ -20,7 +20,7 @@ from nmm.resolvers import (
     ReducedGradient,
     Status,
 )
-from nmm.resolvers.damped_least_squares import Damping
+from nmm.control.resolvers.damped_least_squares import Damping
 
 LAWS = get_args(Damping)
 each_law = pytest.mark.parametrize("law", LAWS)

@@ -23,20 +23,27 @@ from platform_grid import EXAMPLES, random_qp
 from nmm.analysis.singular.jacobians import Reached
 from nmm.base.kinds import OBJECTIVES, REFERENCES, TASKS
 from nmm.control.controller import Controller
-from nmm.functions.function import Function
-from nmm.functions.objectives import Clearance, Manipulability, Objective, Quadratic, QuadraticTerm, Sum
-from nmm.functions.program import Program, evaluate
-from nmm.functions.pursuit import Pursuit
-from nmm.functions.references import CallableReference, Circle
-from nmm.functions.tasks import LinearCoordinates, MeasuredPoints, Position, Task
-from nmm.functions.tasks.measured import MeasuredPoint
-from nmm.functions.tasks.pose import PartsOfPose
-from nmm.functions.tasks.task import Comparison
+from nmm.control.functions.function import Function
+from nmm.control.functions.objectives import (
+    Clearance,
+    Manipulability,
+    Objective,
+    Quadratic,
+    QuadraticTerm,
+    Sum,
+)
+from nmm.control.functions.program import Program, evaluate
+from nmm.control.functions.pursuit import Pursuit
+from nmm.control.functions.references import CallableReference, Circle
+from nmm.control.functions.tasks import LinearCoordinates, MeasuredPoints, Position, Task
+from nmm.control.functions.tasks.measured import MeasuredPoint
+from nmm.control.functions.tasks.pose import PartsOfPose
+from nmm.control.functions.tasks.task import Comparison
+from nmm.control.resolvers import ProjectedGradient
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
 from nmm.plans.following import FromPlan
 from nmm.plans.parking import Parking
-from nmm.resolvers import ProjectedGradient
 
 Array = NDArray[np.float64]
 

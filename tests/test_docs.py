@@ -68,7 +68,7 @@ def test_the_lists_that_follow_from_the_kinds_hold_them_all() -> None:
 
 def test_a_new_kind_gets_its_lines_in_the_lists(monkeypatch: pytest.MonkeyPatch) -> None:
     lists = script("make_kind_lists")
-    made = type("NewTask", (nmm.Heading,), {"__module__": "nmm.functions.tasks.new"})
+    made = type("NewTask", (nmm.Heading,), {"__module__": "nmm.control.functions.tasks.new"})
     monkeypatch.setitem(TASKS.data, "new", made)
     stub = lists.STUB.read_text(encoding="utf-8")
     line = "from .functions.tasks.new import NewTask as NewTask\n"

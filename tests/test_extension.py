@@ -20,17 +20,25 @@ from nmm.base.errors import InputError
 from nmm.base.kernels.compiled import PLATFORM, Kernel, kernel
 from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.control.controller import Controller
-from nmm.functions.function import Function, Row, Shown, Stage
-from nmm.functions.objectives import Manipulability, Sum
-from nmm.functions.references import Line
-from nmm.functions.tasks import CallableFunction, Position, Task
+from nmm.control.functions.function import Function, Row, Shown, Stage
+from nmm.control.functions.objectives import Manipulability, Sum
+from nmm.control.functions.references import Line
+from nmm.control.functions.tasks import CallableFunction, Position, Task
+from nmm.control.resolvers import (
+    Dimensions,
+    Problem,
+    ProjectedGradient,
+    ReducedGradient,
+    Resolver,
+    Setup,
+    State,
+)
+from nmm.control.resolvers.answer import AnswerArrays, certify
+from nmm.control.resolvers.base import RESOLVER
+from nmm.control.resolvers.problem_arrays import ProblemArrays
 from nmm.model.platforms import Platform
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
-from nmm.resolvers import Dimensions, Problem, ProjectedGradient, ReducedGradient, Resolver, Setup, State
-from nmm.resolvers.answer import AnswerArrays, certify
-from nmm.resolvers.base import RESOLVER
-from nmm.resolvers.problem_arrays import ProblemArrays
 from nmm.runs.simulation import simulate
 from nmm.runs.trajectory import Trajectory
 

@@ -20,11 +20,11 @@ from matplotlib.figure import Figure
 from nmm import figures
 from nmm.base.errors import InputError
 from nmm.control.controller import Controller
+from nmm.control.functions.tasks import Heading, LinearCoordinates, Position, Task
+from nmm.control.resolvers import ProjectedGradient
 from nmm.figures import style
-from nmm.functions.tasks import Heading, LinearCoordinates, Position, Task
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot
-from nmm.resolvers import ProjectedGradient
 from nmm.runs.simulation import simulate
 from nmm.runs.trajectory import Trajectory
 from nmm.scenario import Scenario

@@ -13,10 +13,10 @@ from function_grid import ENTRIES, random_configuration
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PPoly
 
-from nmm.functions.function import Evaluation, Function
-from nmm.functions.objectives import JointRange, Manipulability, Quadratic, QuadraticTerm, Sum
-from nmm.functions.program import evaluate
-from nmm.functions.references import (
+from nmm.control.functions.function import Evaluation, Function
+from nmm.control.functions.objectives import JointRange, Manipulability, Quadratic, QuadraticTerm, Sum
+from nmm.control.functions.program import evaluate
+from nmm.control.functions.references import (
     Bearing,
     Circle,
     Constant,
@@ -26,7 +26,7 @@ from nmm.functions.references import (
     Spline,
     VelocityOf,
 )
-from nmm.functions.tasks import Heading, LinearCoordinates, Orientation, Pointing, Pose, Position
+from nmm.control.functions.tasks import Heading, LinearCoordinates, Orientation, Pointing, Pose, Position
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from robot_grid import built, frame_of
 
 import nmm
-from nmm.functions.function import row_scales
-from nmm.resolvers import Status
+from nmm.control.functions.function import row_scales
+from nmm.control.resolvers import Status
 
 Array = NDArray[np.float64]
 

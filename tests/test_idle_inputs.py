@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nmm
-from nmm.control.idle_inputs import idle_inputs, inputs_without_effect
+from nmm.control.step.idle_inputs import idle_inputs, inputs_without_effect
 from nmm.model.robots.robot import Robot
 
 START = {"q2": 0.2, "q3": 1.7, "q4": 0.6}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nmm
-from nmm.control.idle_inputs import _configurations
+from nmm.control.step.idle_inputs import _configurations
 from nmm.diagnosis.assessment import linearisation, linearisations
 from nmm.diagnosis.error_bound import SAFETY, Feedback, Samples, step_errors
 from nmm.model.robots.frame_path import FramePath

@@ -12,10 +12,10 @@ from findings import codes, the
 from wandering import DT, ROBOTS, beyond, wander, wanderer
 
 import nmm
-from nmm.control import bounds
 from nmm.control.integrators import integrator
+from nmm.control.limits import bounds
+from nmm.control.resolvers.answer import Status
 from nmm.model.robots.robot import Robot
-from nmm.resolvers.answer import Status
 
 Array = np.ndarray
 ROBOT = nmm.load("unicycle_3r")

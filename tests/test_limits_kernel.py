@@ -10,7 +10,7 @@ from conditioned import with_singular_values
 from limit_problems import KINDS, Example, examples, largest_scale, nearest, pull, solved, violation
 
 import nmm
-from nmm.resolvers import Problem, ProjectedGradient, Status
+from nmm.control.resolvers import Problem, ProjectedGradient, Status
 
 #: In the gate; `python -m tests.limit_problems 20000` tries more.
 COUNT = 500

@@ -16,14 +16,23 @@ from findings import refused
 from numpy.typing import NDArray
 
 from nmm.control.controller import Controller
-from nmm.functions.function import Function
-from nmm.functions.program import Program, evaluate
-from nmm.functions.references import Bearing, Circle, Constant, Line, LiveTarget, PoseReference
-from nmm.functions.tasks import Distance, Heading, Orientation, Pointing, Pose, Position, Posture, Task
+from nmm.control.functions.function import Function
+from nmm.control.functions.program import Program, evaluate
+from nmm.control.functions.references import Bearing, Circle, Constant, Line, LiveTarget, PoseReference
+from nmm.control.functions.tasks import (
+    Distance,
+    Heading,
+    Orientation,
+    Pointing,
+    Pose,
+    Position,
+    Posture,
+    Task,
+)
+from nmm.control.resolvers import ProjectedGradient
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading import mount
 from nmm.model.robots.robot import Robot
-from nmm.resolvers import ProjectedGradient
 
 Array = NDArray[np.float64]
 

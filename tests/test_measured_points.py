@@ -12,7 +12,7 @@ from scipy.linalg import expm, solve_discrete_are
 
 import nmm
 from nmm.analysis.formulas import symbolic
-from nmm.functions.tasks.depth_estimate import MotionEstimate
+from nmm.control.functions.tasks.depth_estimate import MotionEstimate
 
 ROBOT = nmm.load("unicycle_pan_tilt")
 CAMERA = "camera_optical_frame"
@@ -60,7 +60,7 @@ def test_a_picture_is_believed_and_foretold_as_the_camera_moves(rng: np.random.G
 
 def estimated(moves: np.ndarray, guess: float, noise: float, rng: np.random.Generator) -> np.ndarray:
     """The believed depth over the true one, in pictures taken from places (N, 3)."""
-    from nmm.functions.tasks.depth_estimate import DepthEstimate
+    from nmm.control.functions.tasks.depth_estimate import DepthEstimate
 
     estimate, point, found = DepthEstimate(guess, noise), np.array([0.2, 0.1, 2.0]), []
     for k, c in enumerate(moves):

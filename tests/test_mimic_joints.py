@@ -342,7 +342,7 @@ def grasping(robot: Robot, q0: Array, duration: float) -> list[nmm.Task]:
 
 @pytest.mark.parametrize("method", ["rk4", "midpoint", "euler", "zoh", "adaptive"])
 @pytest.mark.parametrize("resolver", [nmm.ProjectedGradient(1.0), nmm.ReducedGradient(1.0)], ids=["pg", "rg"])
-def test_a_gripper_closes_while_the_hand_moves(method: str, resolver: nmm.resolvers.Resolver) -> None:
+def test_a_gripper_closes_while_the_hand_moves(method: str, resolver: nmm.control.resolvers.Resolver) -> None:
     robot = panda("omni_base")
     assert (robot.n, robot.n_u) == (12, 11)
     q0 = robot.q({"panda_joint2": -0.4, "panda_joint4": -2.0, "panda_joint6": 1.8, FINGERS[0]: 0.035})

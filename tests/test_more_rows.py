@@ -9,8 +9,8 @@ from findings import the
 import nmm
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError
+from nmm.control.resolvers.answer import Status
 from nmm.model.robots.robot import Robot
-from nmm.resolvers.answer import Status
 
 TALL = 6, 4
 #: Image points of a square 0.4 m ahead of the camera; they shall be turned by 0.5 rad.

@@ -21,7 +21,7 @@ from nmm.analysis.redundancy.motion_words import (
     motion_text,
 )
 from nmm.analysis.redundancy.report import redundancy
-from nmm.functions.tasks import Position
+from nmm.control.functions.tasks import Position
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from short_scenario import scenario
 
 import nmm
-from nmm.functions.objectives import Sum
-from nmm.functions.objectives.jacobian import ROWS
+from nmm.control.functions.objectives import Sum
+from nmm.control.functions.objectives.jacobian import ROWS
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from playback_browser import window as window
 from ports import MOST, served
 
 import nmm
-from nmm.control.quantities import QUANTITIES
+from nmm.control.step.quantities import QUANTITIES
 from nmm.driving import ScenarioSetup, drive
 from nmm.driving.driven import Driven
 from nmm.driving.things import Things

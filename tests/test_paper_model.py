@@ -12,8 +12,8 @@ from numpy import pi
 from numpy.typing import NDArray
 from paper_cases import CASES, Case
 
-from nmm.functions.program import evaluate
-from nmm.functions.tasks import Heading, Position
+from nmm.control.functions.program import evaluate
+from nmm.control.functions.tasks import Heading, Position
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot

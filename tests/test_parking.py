@@ -7,7 +7,7 @@ import pytest
 
 import nmm
 from nmm.base.errors import InputError
-from nmm.functions.program import Program
+from nmm.control.functions.program import Program
 from nmm.plans import parking
 
 GOAL = nmm.Goal(0.001, 0.001)

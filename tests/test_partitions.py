@@ -12,7 +12,7 @@ import twin
 from conditioned import Array, each_shape
 from findings import refused
 
-from nmm.resolvers import (
+from nmm.control.resolvers import (
     Answer,
     Dimensions,
     ExtendedJacobian,
@@ -21,7 +21,7 @@ from nmm.resolvers import (
     ReducedGradient,
     Status,
 )
-from nmm.resolvers.partitions import COLUMNS, HELD, MODE, OVERDUE, PartitionState, search_partition
+from nmm.control.resolvers.partitions import COLUMNS, HELD, MODE, OVERDUE, PartitionState, search_partition
 
 
 def measures(J: Array) -> dict[tuple[int, ...], float]:

@@ -12,10 +12,18 @@ from numpy.typing import NDArray
 from nmm.analysis.redundancy.laps import Repeatability, repeatability
 from nmm.base.errors import InputError
 from nmm.control.controller import Controller
-from nmm.functions.references import Bearing, Circle, Constant, Line, PoseReference, Spline, SteadyTurn
-from nmm.functions.tasks import Heading, Orientation, Pose, Position, Task
+from nmm.control.functions.references import (
+    Bearing,
+    Circle,
+    Constant,
+    Line,
+    PoseReference,
+    Spline,
+    SteadyTurn,
+)
+from nmm.control.functions.tasks import Heading, Orientation, Pose, Position, Task
+from nmm.control.resolvers import ProjectedGradient
 from nmm.model.robots.robot import Robot
-from nmm.resolvers import ProjectedGradient
 from nmm.scenario import Scenario
 
 Array = NDArray[np.float64]

@@ -8,9 +8,9 @@ from findings import refused
 from level_problems import Off, compared, problems
 
 import nmm
-from nmm.resolvers.answer import Status, unanswered
-from nmm.resolvers.base import State
-from nmm.resolvers.problem import Problem
+from nmm.control.resolvers.answer import Status, unanswered
+from nmm.control.resolvers.base import State
+from nmm.control.resolvers.problem import Problem
 
 RESOLVERS = {
     "pg": nmm.ProjectedGradient(alpha=0.5),

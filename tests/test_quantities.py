@@ -19,9 +19,9 @@ import pytest
 
 import nmm
 from nmm.base.arrays import Array, Integers
-from nmm.control.quantities import QUANTITIES, Curve, Number, Record, RecordedQuantity, saved
-from nmm.control.recorded import Recorded
-from nmm.control.step import Step
+from nmm.control.step.quantities import QUANTITIES, Curve, Number, Record, RecordedQuantity, saved
+from nmm.control.step.recorded import Recorded
+from nmm.control.step.step import Step
 from nmm.diagnosis.summary import RUN_NUMBERS
 from nmm.playback.channels import channels
 from nmm.playback.running import Growing

@@ -25,7 +25,7 @@ from nmm.base.kernels.record_layout import (
     views,
 )
 from nmm.base.kernels.records import Rows
-from nmm.functions.references import Circle
+from nmm.control.functions.references import Circle
 
 
 class Inner(NamedTuple):

@@ -16,11 +16,11 @@ import nmm
 from nmm.analysis.redundancy.laps import Laps, Repeatability, repeatability
 from nmm.base.errors import InputError
 from nmm.control.controller import Controller
+from nmm.control.functions.references import Circle
+from nmm.control.functions.tasks import Heading, LinearCoordinates, Position, Task
+from nmm.control.resolvers import CallableResolver, ExtendedJacobian, Problem, ProjectedGradient
 from nmm.figures.repeatability import laps as laps_figure
-from nmm.functions.references import Circle
-from nmm.functions.tasks import Heading, LinearCoordinates, Position, Task
 from nmm.model.robots.robot import Robot
-from nmm.resolvers import CallableResolver, ExtendedJacobian, Problem, ProjectedGradient
 from nmm.scenario import Scenario
 
 Array = NDArray[np.float64]

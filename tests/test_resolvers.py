@@ -16,7 +16,7 @@ from resolver_grid import every_resolver
 
 from nmm.base.errors import InputError
 from nmm.base.kinds import RESOLVERS
-from nmm.resolvers import (
+from nmm.control.resolvers import (
     Answer,
     CallableResolver,
     DampedLeastSquares,

@@ -14,8 +14,8 @@ from robot_grid import ARMS, BASES, built, frame_of, start
 from scipy.linalg import null_space, qr
 
 import nmm
+from nmm.control.resolvers import Resolver
 from nmm.model.robots.robot import Robot
-from nmm.resolvers import Resolver
 
 Array = NDArray[np.float64]
 

@@ -26,11 +26,11 @@ from nmm.base.kernels.record_layout import (
     put_back,
     views,
 )
-from nmm.control.idle_inputs import idle_inputs
-from nmm.resolvers.answer import AnswerArrays, certify
-from nmm.resolvers.base import RESOLVER, Resolver, Setup, State
-from nmm.resolvers.problem import Dimensions
-from nmm.resolvers.problem_arrays import ProblemArrays
+from nmm.control.resolvers.answer import AnswerArrays, certify
+from nmm.control.resolvers.base import RESOLVER, Resolver, Setup, State
+from nmm.control.resolvers.problem import Dimensions
+from nmm.control.resolvers.problem_arrays import ProblemArrays
+from nmm.control.step.idle_inputs import idle_inputs
 from nmm.runs import closed_loop
 from nmm.runs.compiled_loop import CompiledLoop
 from nmm.runs.recording import Recorder

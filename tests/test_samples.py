@@ -10,7 +10,7 @@ from findings import every
 from wandering import beyond
 
 import nmm
-from nmm.resolvers.partitions import PartitionState
+from nmm.control.resolvers.partitions import PartitionState
 
 ROBOT = nmm.load("unicycle_3r")
 Q0 = ROBOT.q({"q1": -1.0, "q2": 0.7, "q3": 0.5})

@@ -12,7 +12,7 @@ from findings import refused
 from short_scenario import scenario
 
 import nmm
-import nmm.resolvers
+import nmm.control.resolvers
 from nmm import Scenario, ScenarioError
 from nmm.base import kinds
 from nmm.control.integrators import METHODS
@@ -187,7 +187,7 @@ def test_no_objective(tmp_path: Path) -> None:
 def test_resolvers(tmp_path: Path, text: str, expected: nmm.extending.Resolver) -> None:
     found = scenario(tmp_path, resolver=text).controller().solver.resolver
     assert type(found) is type(expected)
-    dimensions = nmm.resolvers.Dimensions(2, 0, ("v", "omega", "q1", "q2"))
+    dimensions = nmm.control.resolvers.Dimensions(2, 0, ("v", "omega", "q1", "q2"))
     for ours, theirs in zip(found.setup(dimensions), expected.setup(dimensions), strict=True):
         assert np.array_equal(ours, theirs)
 

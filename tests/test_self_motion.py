@@ -18,7 +18,7 @@ import nmm
 from nmm.analysis.redundancy.moving import SelfMotion, self_motion
 from nmm.analysis.redundancy.report import redundancy
 from nmm.base.errors import InputError, SingularError
-from nmm.functions.tasks import Pose, Position, Task
+from nmm.control.functions.tasks import Pose, Position, Task
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
 from nmm.playback import write_html

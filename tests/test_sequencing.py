@@ -12,7 +12,7 @@ import pytest
 from findings import every, refused, the, why
 
 import nmm
-from nmm.control.sequence import Moment, Sequence
+from nmm.control.sequencing.sequence import Moment, Sequence
 
 ROBOT = nmm.load("unicycle_3r")
 START = ROBOT.q({"q1": 0.4, "q2": 0.6, "q3": 0.9})

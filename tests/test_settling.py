@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import nmm
-from nmm.control.sequence import Event
+from nmm.control.sequencing.sequence import Event
 from nmm.diagnosis.summary import settling_time
 from nmm.figures import comparison
 

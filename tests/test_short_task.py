@@ -13,9 +13,9 @@ from numpy import pi
 from nmm import Scenario
 from nmm.base.errors import InputError
 from nmm.cli.subjects import studied
-from nmm.functions.function import Function
-from nmm.functions.program import evaluate
-from nmm.functions.tasks import (
+from nmm.control.functions.function import Function
+from nmm.control.functions.program import evaluate
+from nmm.control.functions.tasks import (
     CenterOfMass,
     Distance,
     Heading,

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from spatial_arms import MOVING, UR5
 
 import nmm
-from nmm.functions.function import Function, Row, Stage
-from nmm.functions.program import evaluate
-from nmm.functions.references import Circle, Constant, PoseReference, Slerp, SteadyTurn
-from nmm.functions.tasks import (
+from nmm.control.functions.function import Function, Row, Stage
+from nmm.control.functions.program import evaluate
+from nmm.control.functions.references import Circle, Constant, PoseReference, Slerp, SteadyTurn
+from nmm.control.functions.tasks import (
     CenterOfMass,
     Distance,
     Orientation,

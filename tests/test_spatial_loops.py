@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from spatial_arms import MOVING, UR5, near, pose
 
 import nmm
-from nmm.functions.program import evaluate
-from nmm.functions.references import Circle, PoseReference, SteadyTurn, rotation_vector
-from nmm.functions.tasks import (
+from nmm.control.functions.program import evaluate
+from nmm.control.functions.references import Circle, PoseReference, SteadyTurn, rotation_vector
+from nmm.control.functions.tasks import (
     CenterOfMass,
     Distance,
     LinearCoordinates,

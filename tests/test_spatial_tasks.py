@@ -11,10 +11,10 @@ from numpy import pi
 from numpy.typing import NDArray
 from spatial_arms import MOVING, UR5, pose
 
-from nmm.functions.function import Evaluation, Function
-from nmm.functions.program import Program, evaluate
-from nmm.functions.references import PoseReference, Slerp, SteadyTurn, rotation_vector
-from nmm.functions.tasks import (
+from nmm.control.functions.function import Evaluation, Function
+from nmm.control.functions.program import Program, evaluate
+from nmm.control.functions.references import PoseReference, Slerp, SteadyTurn, rotation_vector
+from nmm.control.functions.tasks import (
     CenterOfMass,
     Distance,
     Orientation,
@@ -24,7 +24,7 @@ from nmm.functions.tasks import (
     Posture,
     Task,
 )
-from nmm.functions.tasks.task import Comparison
+from nmm.control.functions.tasks.task import Comparison
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
 

@@ -12,7 +12,7 @@ from findings import refused
 
 import nmm
 from nmm.control.integrators import integrator
-from nmm.control.step_size import DECREASE
+from nmm.control.step.step_size import DECREASE
 
 ROBOT = nmm.load("unicycle_3r")
 Q0 = ROBOT.q({"q1": 0.3, "q2": 0.6, "q3": 0.9})

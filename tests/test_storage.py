@@ -13,7 +13,7 @@ import yaml
 from findings import refused
 
 import nmm
-from nmm.control.quantities import saved
+from nmm.control.step.quantities import saved
 from nmm.folders.whole import replaced_folder
 
 

@@ -33,7 +33,7 @@ from nmm.analysis.formulas import SymbolicAnalysis, lower_bound, never_zero, sin
 from nmm.analysis.formulas.zeros import Basis, Limits, Undecided, Zeros
 from nmm.base.errors import InputError
 from nmm.base.findings import Finding
-from nmm.functions.tasks import Heading, LinearCoordinates, Position
+from nmm.control.functions.tasks import Heading, LinearCoordinates, Position
 from nmm.model.platforms import Omnidirectional
 from nmm.model.robots.loading import load
 

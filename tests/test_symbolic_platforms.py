@@ -20,8 +20,8 @@ from nmm.analysis.formulas.frames import Frames
 from nmm.analysis.formulas.geometry import Geometry
 from nmm.analysis.formulas.quotient import Quotient, quotient
 from nmm.base.errors import InputError
-from nmm.functions.references import Bearing, Circle, PoseReference
-from nmm.functions.tasks import (
+from nmm.control.functions.references import Bearing, Circle, PoseReference
+from nmm.control.functions.tasks import (
     CallableFunction,
     CenterOfMass,
     Distance,

@@ -19,7 +19,7 @@ from urdf_parts import robot as urdf
 import nmm
 from nmm.analysis.formulas import TooLarge, never_zero, singular_set, symbolic
 from nmm.base.findings import Finding
-from nmm.functions.tasks import CenterOfMass, Orientation, Pose, Position, Posture
+from nmm.control.functions.tasks import CenterOfMass, Orientation, Pose, Position, Posture
 
 
 @pytest.mark.parametrize("seen_from", [None, "link2"])

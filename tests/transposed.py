@@ -9,10 +9,10 @@ import numpy as np
 from nmm.base.arrays import Array, Integers, positive
 from nmm.base.kernels.compiled import Kernel, clear, integer_scratch, kernel, scratch
 from nmm.base.kernels.linear_algebra import closest_solution, orthonormal_rows
-from nmm.resolvers.answer import SINGULAR_J, AnswerArrays, certify
-from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
-from nmm.resolvers.problem import Dimensions
-from nmm.resolvers.problem_arrays import ProblemArrays
+from nmm.control.resolvers.answer import SINGULAR_J, AnswerArrays, certify
+from nmm.control.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
+from nmm.control.resolvers.problem import Dimensions
+from nmm.control.resolvers.problem_arrays import ProblemArrays
 
 
 @kernel(RESOLVER)

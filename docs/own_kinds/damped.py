@@ -7,10 +7,10 @@ import numpy as np
 from nmm.base.arrays import Array, Integers, positive
 from nmm.base.kernels.compiled import Kernel, kernel, scratch
 from nmm.base.kernels.linear_algebra import eliminate
-from nmm.resolvers.answer import RELAXED, AnswerArrays, certify
-from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
-from nmm.resolvers.problem import Dimensions
-from nmm.resolvers.problem_arrays import ProblemArrays
+from nmm.control.resolvers.answer import RELAXED, AnswerArrays, certify
+from nmm.control.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
+from nmm.control.resolvers.problem import Dimensions
+from nmm.control.resolvers.problem_arrays import ProblemArrays
 
 DAMPING = 0
 

@@ -5,7 +5,7 @@ import math
 from nmm.base.arrays import Array
 from nmm.base.kernels.compiled import kernel
 from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
-from nmm.functions.function import Function, Row, Stage
+from nmm.control.functions.function import Function, Row, Stage
 from nmm.model.robots.robot import Robot
 
 

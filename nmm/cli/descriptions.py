@@ -53,8 +53,8 @@ def info(
     nmm info my_robot.urdf.xacro -a arm=true --package-dir my_robot_description=~/robots/mine
     nmm info --scenario unicycle_3r_position
     """
-    from nmm.control.idle_inputs import inputs_without_effect
     from nmm.control.steering import Steering
+    from nmm.control.step.idle_inputs import inputs_without_effect
     from nmm.model.robots.loading import load
 
     keywords, texts = loading.keywords(), arguments_of(arguments)

@@ -18,7 +18,7 @@ from nmm.base.kinds import RESOLVERS, TASKS
 from nmm.base.text_format import listed, split_outside_brackets
 
 if TYPE_CHECKING:
-    from nmm.resolvers.base import Resolver
+    from nmm.control.resolvers.base import Resolver
     from nmm.scenario import Scenario
 
 ROBOT_HELP = "A bundled name (see `nmm robots`), a .urdf, .xacro or .xml file, or package://PACKAGE/PATH."
@@ -268,7 +268,7 @@ def _twice(option: str, first: str, second: str) -> InputError:
 
 def _from_file(file: Path, name: str, option: str) -> Resolver:
     """A `Resolver`, a class of such, or a function problem -> u of a Python file, which is run."""
-    from nmm.resolvers import CallableResolver, Resolver
+    from nmm.control.resolvers import CallableResolver, Resolver
 
     where = f"{option}: {file}"
     spec = spec_from_file_location(f"nmm_own_{file.stem}", file)

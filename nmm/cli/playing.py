@@ -15,9 +15,9 @@ from nmm.cli.options import ARM, AT, ROBOT_HELP, SUBJECT_SET, arguments_of, flag
 from nmm.cli.output import progress, show_text, warn
 
 if TYPE_CHECKING:
+    from nmm.control.functions.function import Function
+    from nmm.control.functions.tasks import Task
     from nmm.driving.setups import DriveSetup
-    from nmm.functions.function import Function
-    from nmm.functions.tasks import Task
     from nmm.model.robots.motion import Motion
     from nmm.model.robots.robot import Robot
     from nmm.runs.trajectory import Trajectory

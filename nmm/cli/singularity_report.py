@@ -20,7 +20,7 @@ from nmm.base.latex import Typeset, joined, minor_name, sentence, symbol
 from nmm.base.text_format import measured
 from nmm.cli.document import Item, Table, fields, number, rounded
 from nmm.control.directions import SMALL_PART, direction_text
-from nmm.resolvers.reduced_gradient import ReducedGradient
+from nmm.control.resolvers.reduced_gradient import ReducedGradient
 
 if TYPE_CHECKING:
     from nmm.cli.subjects import Studied

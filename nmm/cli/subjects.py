@@ -15,8 +15,8 @@ from nmm.cli.output import warn
 if TYPE_CHECKING:
     from nmm.analysis.singular.jacobians import Subject
     from nmm.control.controller import Controller
-    from nmm.functions.function import Function
-    from nmm.functions.tasks import Stack, Task
+    from nmm.control.functions.function import Function
+    from nmm.control.functions.tasks import Stack, Task
     from nmm.model.robots.robot import Robot
     from nmm.runs.trajectory import Trajectory
     from nmm.scenario import Scenario

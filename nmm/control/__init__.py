@@ -1,1 +1,4 @@
-"""From functions to J u = rate and h, and from these to u: the controllers that users call."""
+"""From robot, tasks, limits and objective to u: functions, resolvers, steps, and controllers that users call.
+
+Nothing here integrates, records or judges.
+"""

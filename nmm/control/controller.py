@@ -14,26 +14,26 @@ from nmm.base.arrays import Array, positive, scalar, vector
 from nmm.base.errors import InputError
 from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.text_format import listed
-from nmm.control.collisions import Collisions
-from nmm.control.idle_inputs import idle_inputs, inputs_without_effect
+from nmm.control.functions.function import Row
+from nmm.control.functions.objectives.base import Objective
+from nmm.control.functions.program import PINOCCHIO, nothing
+from nmm.control.functions.tasks.task import Stack, Task
 from nmm.control.integrators import STEPPING, integrator
-from nmm.control.limit_report import LimitReport
-from nmm.control.limits import Limits
+from nmm.control.limits.collisions import Collisions
+from nmm.control.limits.limits import Limits
 from nmm.control.period_monitor import PeriodMonitor
+from nmm.control.resolvers.base import Resolver
 from nmm.control.retreat import Retreat
-from nmm.control.safety_filter import SafetyFilter
-from nmm.control.sequence import Schedule
+from nmm.control.sequencing.sequence import Schedule
 from nmm.control.steering import Steered, Steering
-from nmm.control.step import Step
-from nmm.control.step_layout import SERVO, Given, checked
-from nmm.control.step_solver import FAILED, StepSolver
-from nmm.control.stepping import ADVANCE, advance, tableau
-from nmm.functions.function import Row
-from nmm.functions.objectives.base import Objective
-from nmm.functions.program import PINOCCHIO, nothing
-from nmm.functions.tasks.task import Stack, Task
+from nmm.control.step.idle_inputs import idle_inputs, inputs_without_effect
+from nmm.control.step.limit_report import LimitReport
+from nmm.control.step.safety_filter import SafetyFilter
+from nmm.control.step.step import Step
+from nmm.control.step.step_layout import SERVO, Given, checked
+from nmm.control.step.step_solver import FAILED, StepSolver
+from nmm.control.step.stepping import ADVANCE, advance, tableau
 from nmm.model.robots.robot import Robot
-from nmm.resolvers.base import Resolver
 
 FLOAT64 = np.dtype(np.float64)
 

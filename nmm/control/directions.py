@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 from nmm.base.arrays import Array
 from nmm.base.findings import Finding
 from nmm.base.text_format import signed_sum
-from nmm.functions.function import Function, Row, row_scales
-from nmm.functions.tasks.pose import Orientation, Pose
-from nmm.functions.tasks.task import Stack
+from nmm.control.functions.function import Function, Row, row_scales
+from nmm.control.functions.tasks.pose import Orientation, Pose
+from nmm.control.functions.tasks.task import Stack
+from nmm.control.resolvers.answer import Status
+from nmm.control.resolvers.problem_arrays import ProblemArrays
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
-from nmm.resolvers.answer import Status
-from nmm.resolvers.problem_arrays import ProblemArrays
 
 #: Singular values this small beside the largest are zero.
 TOLERANCE = 1e-10

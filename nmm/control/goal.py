@@ -9,7 +9,7 @@ import numpy as np
 
 from nmm.base.arrays import Array, Integers, positive
 from nmm.base.kernels.compiled import inlined
-from nmm.functions.function import Row
+from nmm.control.functions.function import Row
 
 
 class Goal:

@@ -18,10 +18,10 @@ from nmm.base.arrays import Array, positive, scalar
 from nmm.base.errors import InputError
 from nmm.base.kernels.compiled import compiled
 from nmm.base.kernels.record_layout import Cell, IntegerVector, SampledCell, SampledIntegerCell, Vector
+from nmm.control.functions.function import Row
 from nmm.control.goal import METRES, Goal, norms, unit_codes
-from nmm.functions.function import Row
+from nmm.control.resolvers.problem_arrays import ProblemArrays
 from nmm.model.robots.robot import Robot
-from nmm.resolvers.problem_arrays import ProblemArrays
 
 #: The weight of 1 rad of error, in robot's reaches.
 RADIAN = 0.3

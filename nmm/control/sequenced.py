@@ -10,22 +10,22 @@ from numpy.typing import ArrayLike
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError, RunError
 from nmm.base.text_format import listed
-from nmm.control.collisions import Collisions
 from nmm.control.controller import Controller
-from nmm.control.limits import Limits
+from nmm.control.functions.objectives.base import Objective
+from nmm.control.functions.program import PINOCCHIO
+from nmm.control.functions.references import Constant
+from nmm.control.functions.tasks.task import Stack, Task
+from nmm.control.limits.collisions import Collisions
+from nmm.control.limits.limits import Limits
+from nmm.control.resolvers.base import Resolver
+from nmm.control.resolvers.callable_resolver import CallableResolver
+from nmm.control.resolvers.problem import Problem
 from nmm.control.retreat import Retreat
-from nmm.control.sequence import Event, Moment, Schedule, Sequence
+from nmm.control.sequencing.sequence import Event, Moment, Schedule, Sequence
 from nmm.control.steering import Steering
-from nmm.control.step_layout import SERVO, Given, checked
-from nmm.control.step_solver import StepSolver
-from nmm.functions.objectives.base import Objective
-from nmm.functions.program import PINOCCHIO
-from nmm.functions.references import Constant
-from nmm.functions.tasks.task import Stack, Task
+from nmm.control.step.step_layout import SERVO, Given, checked
+from nmm.control.step.step_solver import StepSolver
 from nmm.model.robots.robot import Robot
-from nmm.resolvers.base import Resolver
-from nmm.resolvers.callable_resolver import CallableResolver
-from nmm.resolvers.problem import Problem
 
 
 class SequencedController(Controller):

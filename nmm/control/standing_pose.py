@@ -4,8 +4,8 @@ import numpy as np
 
 from nmm.base.arrays import Array
 from nmm.base.findings import Finding
-from nmm.control.step_solver import StepSolver
-from nmm.functions.program import evaluate
+from nmm.control.functions.program import evaluate
+from nmm.control.step.step_solver import StepSolver
 from nmm.model.robots.configuration import Configuration
 
 #: Singular values below this share of the largest are zero.

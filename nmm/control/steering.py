@@ -22,13 +22,13 @@ from nmm.base.arrays import Array, positive, scalar
 from nmm.base.kernels.compiled import compiled
 from nmm.base.kernels.linear_algebra import dot
 from nmm.base.kernels.record_layout import Cell, IntegerCell, IntegerVector, Vector
-from nmm.functions.pursuit import Pursuit
-from nmm.functions.tasks.task import Task
+from nmm.control.functions.pursuit import Pursuit
+from nmm.control.functions.tasks.task import Task
+from nmm.control.resolvers.problem_arrays import ProblemArrays
 from nmm.model.platforms.base import Platform
 from nmm.model.platforms.steering import SteeringPivot
 from nmm.model.robots.reach import first_tip, reach
 from nmm.model.robots.robot import Robot
-from nmm.resolvers.problem_arrays import ProblemArrays
 
 
 class SteeringNumbers(NamedTuple):

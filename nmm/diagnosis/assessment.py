@@ -13,14 +13,14 @@ from nmm.base.errors import RunError
 from nmm.base.kernels.compiled import checked_by_caller, compiled_without_gil, scratch
 from nmm.base.kernels.record_layout import views
 from nmm.control.controller import Controller
-from nmm.control.equations import ControlStep, call_step
+from nmm.control.functions.callbacks import DIFFERENCE_STEP
+from nmm.control.functions.program import BESIDE
 from nmm.control.integrators import Integrator
+from nmm.control.resolvers.answer import SINGULAR_J
+from nmm.control.resolvers.base import State
+from nmm.control.resolvers.partitions import HELD, MODE, PartitionState
+from nmm.control.step.equations import ControlStep, call_step
 from nmm.diagnosis.error_bound import ENDS, Departure, Samples, adaptive_errors, decay, departure, step_errors
-from nmm.functions.callbacks import DIFFERENCE_STEP
-from nmm.functions.program import BESIDE
-from nmm.resolvers.answer import SINGULAR_J
-from nmm.resolvers.base import State
-from nmm.resolvers.partitions import HELD, MODE, PartitionState
 from nmm.runs.recording import Recorder
 
 #: Number of instants at which the integrator's stability is examined.

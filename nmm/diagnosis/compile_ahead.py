@@ -2,10 +2,10 @@
 
 from nmm.base.kernels.parallel_compile import compile_in_parallel
 from nmm.base.kernels.spectra import WRITE_SPECTRA, write_spectra
-from nmm.control.equations import step
+from nmm.control.functions.program import PLACE, place
+from nmm.control.step.equations import step
 from nmm.diagnosis.assessment import LINEARISE, linearise
 from nmm.diagnosis.error_bound import write_step_errors
-from nmm.functions.program import PLACE, place
 from nmm.model.robots.frame_path import follow_frame
 from nmm.runs.compiled_loop import ADVANCE_SAMPLES, advance_samples
 

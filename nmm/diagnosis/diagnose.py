@@ -8,12 +8,12 @@ import numpy as np
 
 from nmm.base.findings import Finding
 from nmm.control.controller import Controller
+from nmm.control.functions.function import row_scales
 from nmm.control.goal import Goal, error_sizes
-from nmm.control.sequence import Schedule
+from nmm.control.sequencing.sequence import Schedule
 from nmm.diagnosis.judgement import Judged, judge
 from nmm.diagnosis.limits import binding, broken_limits, broken_rows, distances_short, not_kept, ran_into
 from nmm.diagnosis.reasons import near_singularity
-from nmm.functions.function import row_scales
 from nmm.runs.clearance import Swept
 from nmm.runs.leg import Leg
 from nmm.runs.recording import Recorder

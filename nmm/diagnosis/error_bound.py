@@ -23,7 +23,7 @@ from numba import types
 
 from nmm.base.arrays import Array, Flags, Integers
 from nmm.base.kernels.compiled import compiled, kernel, view
-from nmm.control.task_rows import gain_rows
+from nmm.control.step.task_rows import gain_rows
 from nmm.runs.recording import Recorder
 from nmm.runs.residuals import differs
 

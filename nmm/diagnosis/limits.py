@@ -9,8 +9,8 @@ from nmm.base.arrays import Array
 from nmm.base.findings import Finding
 from nmm.base.text_format import listed
 from nmm.control.controller import Controller
-from nmm.control.limits import LimitsOn
-from nmm.control.safety_filter import Counts
+from nmm.control.limits.limits import LimitsOn
+from nmm.control.step.safety_filter import Counts
 from nmm.model.collisions.scene import Scene
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.wheel_rates import turning_wheels

@@ -9,7 +9,7 @@ import numpy as np
 
 from nmm.base.findings import Finding
 from nmm.base.findings.run import MOTORS
-from nmm.control.quantities import Number, placed
+from nmm.control.step.quantities import Number, placed
 from nmm.diagnosis.limits import fast_wheels
 from nmm.diagnosis.motors import motor_findings
 from nmm.model.collisions.obstacle import obstacle_as_json

@@ -10,11 +10,11 @@ import numpy as np
 from nmm.base.arrays import Array
 from nmm.base.errors import NmmError, expect
 from nmm.control.controller import Controller
-from nmm.control.step import Step
+from nmm.control.functions.program import evaluate
+from nmm.control.step.step import Step
 from nmm.diagnosis.reasons import out_of_reach, stretched
 from nmm.driving.setups import Choice, DriveSetup, Settings, aimed, named, targets_of
 from nmm.driving.things import Thing, Things
-from nmm.functions.program import evaluate
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import CENTER_OF_MASS

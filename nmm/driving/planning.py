@@ -14,12 +14,13 @@ import numpy as np
 from nmm.base.arrays import Array
 from nmm.base.errors import NmmError
 from nmm.control.controller import Controller
+from nmm.control.functions.references import Constant
+from nmm.control.functions.references.live_target import LiveTarget
+from nmm.control.functions.tasks.task import Task
 from nmm.control.goal import Goal
+from nmm.control.resolvers import CallableResolver, ProjectedGradient
 from nmm.driving.driven import Driven
 from nmm.driving.setups import led_by
-from nmm.functions.references import Constant
-from nmm.functions.references.live_target import LiveTarget
-from nmm.functions.tasks.task import Task
 from nmm.model.robots.frame_path import FramePath
 from nmm.model.robots.motion import Motion
 from nmm.plans.plan import Plan
@@ -27,7 +28,6 @@ from nmm.plans.planned import plan
 from nmm.playback.drawing import Command, packed
 from nmm.playback.keyframes import ghost_samples
 from nmm.playback.shapes import DrawnRobot
-from nmm.resolvers import CallableResolver, ProjectedGradient
 
 #: How long a plan is looked for, s, and how much more than the controller it keeps, m.
 SECONDS, MARGIN = 5.0, 0.05

@@ -16,15 +16,15 @@ from nmm.base.arrays import Array
 from nmm.base.errors import InputError, NmmError, expect, expect_kind, expect_known
 from nmm.base.kinds import RESOLVERS
 from nmm.control.controller import Controller
-from nmm.control.limits import Limits
-from nmm.functions.function import Function
-from nmm.functions.program import evaluate
-from nmm.functions.references.live_target import LiveTarget
-from nmm.functions.tasks.task import Stack, Task
+from nmm.control.functions.function import Function
+from nmm.control.functions.program import evaluate
+from nmm.control.functions.references.live_target import LiveTarget
+from nmm.control.functions.tasks.task import Stack, Task
+from nmm.control.limits.limits import Limits
+from nmm.control.resolvers.base import Resolver
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.surroundings import NO_SURROUNDINGS, Surroundings
-from nmm.resolvers.base import Resolver
 from nmm.scenario import Scenario
 from nmm.scenario.resolvers import RESOLVER_PARTS
 

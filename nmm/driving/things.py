@@ -10,10 +10,10 @@ import numpy as np
 
 from nmm.base.arrays import Array
 from nmm.control.controller import Controller
-from nmm.functions.function import Function, Sight
-from nmm.functions.program import evaluate
-from nmm.functions.references.live_target import Displaced, LiveTarget
-from nmm.functions.tasks.task import Stack
+from nmm.control.functions.function import Function, Sight
+from nmm.control.functions.program import evaluate
+from nmm.control.functions.references.live_target import Displaced, LiveTarget
+from nmm.control.functions.tasks.task import Stack
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
 from nmm.runs.seen import same_point

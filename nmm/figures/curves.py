@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from nmm.base import resolver_style
 from nmm.base.arrays import Array
-from nmm.control.quantities import QUANTITIES
+from nmm.control.step.quantities import QUANTITIES
 from nmm.figures import style
 from nmm.runs.components import components
 from nmm.runs.trajectory import Trajectory

@@ -13,7 +13,7 @@ import yaml
 
 from nmm.base.errors import InputError, RobotError, expect
 from nmm.base.figure_options import Drawn, drawn_as
-from nmm.control.quantities import placed, saved
+from nmm.control.step.quantities import placed, saved
 from nmm.diagnosis.summary import FORMAT
 from nmm.folders.whole import FolderKind, replaced_folder, steady
 from nmm.model.collisions.obstacle import (
@@ -93,7 +93,7 @@ def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
 
 
 def _loaded(folder: Path, robot: Robot | None) -> Trajectory:
-    from nmm.control.sequence import Event
+    from nmm.control.sequencing.sequence import Event
     from nmm.folders.schema import ToldRun, check_arrays, read_arrays, read_checked
     from nmm.model.robots.loading import load as load_robot
     from nmm.runs.trajectory import Trajectory

@@ -14,7 +14,7 @@ from nmm.base.errors import InputError, expect
 from nmm.base.files import expect_file, read_bytes
 from nmm.base.machine import SHARE, free_memory
 from nmm.base.text_format import one_line, printable
-from nmm.control.quantities import saved
+from nmm.control.step.quantities import saved
 from nmm.folders.whole import MOST
 from nmm.runs.residuals import NO_RESIDUALS
 from nmm.runs.trajectory import Outcome

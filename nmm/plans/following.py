@@ -15,8 +15,8 @@ from nmm.base.errors import NmmError, RunError, expect
 from nmm.base.findings import Finding
 from nmm.base.kernels.compiled import checked_by_caller, compiled, kernel, scratch, view
 from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
+from nmm.control.functions.function import Function, Renewal, Row, Shown, Stage
 from nmm.control.goal import Goal, error_sizes, norms, unit_codes
-from nmm.functions.function import Function, Renewal, Row, Shown, Stage
 from nmm.model.robots.reach import first_tip
 from nmm.model.robots.robot import Robot
 

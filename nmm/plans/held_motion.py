@@ -14,7 +14,7 @@ import numpy as np
 
 from nmm.base.arrays import Array, Integers
 from nmm.collisions.legs_check import MARGIN
-from nmm.control.limits import LimitsOn
+from nmm.control.limits.limits import LimitsOn
 from nmm.model.robots.zero_order_hold import inputs_of
 from nmm.plans.holding import ARRIVED, Followed, Held
 from nmm.plans.path import Guide

@@ -20,10 +20,10 @@ from nmm.base.kernels.linear_algebra import copied
 from nmm.base.kernels.record_layout import BLOCKS, views
 from nmm.collisions.legs_check import MovedShapes, along, leg_blocked, too_near
 from nmm.collisions.motion_check import MotionCheck
+from nmm.control.functions.program import BESIDE, evaluate
+from nmm.control.functions.tasks.pose import Pose
+from nmm.control.functions.tasks.task import Task
 from nmm.control.goal import Goal, norms, unit_codes
-from nmm.functions.program import BESIDE, evaluate
-from nmm.functions.tasks.pose import Pose
-from nmm.functions.tasks.task import Task
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
 from nmm.plans.goals import STEPS, Newton, TaskError, newton_step

@@ -13,10 +13,10 @@ from nmm.base.findings import Finding
 from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.record_layout import Memory, views
 from nmm.collisions.motion_check import MotionCheck
-from nmm.control.collisions import Collisions
+from nmm.control.functions.tasks.task import Task
 from nmm.control.goal import Goal, error_sizes
-from nmm.control.limits import Limits
-from nmm.functions.tasks.task import Task
+from nmm.control.limits.collisions import Collisions
+from nmm.control.limits.limits import Limits
 from nmm.model.collisions.obstacle import shifts
 from nmm.model.robots.joint_table import as_row
 from nmm.model.robots.robot import Robot

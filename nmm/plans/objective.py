@@ -6,8 +6,8 @@ import numpy as np
 
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError, expect_kind
-from nmm.functions.objectives.base import Objective
-from nmm.functions.program import COMPILED, Program, run_program
+from nmm.control.functions.objectives.base import Objective
+from nmm.control.functions.program import COMPILED, Program, run_program
 from nmm.model.robots.robot import Robot
 from nmm.plans.shooting import Shooting
 

@@ -10,7 +10,7 @@ from nmm.base.arrays import Array, scalar
 from nmm.base.errors import InputError
 from nmm.base.kernels.compiled import compiled, kernel, scratch
 from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
-from nmm.functions.function import Function, Row, Stage
+from nmm.control.functions.function import Function, Row, Stage
 from nmm.model.robots.robot import Robot
 from nmm.plans.ways import ROLLS, Ways, ways_of
 from nmm.plans.words import PARTS, reeds_shepp, wrapped

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, positive
 from nmm.base.errors import InputError
-from nmm.control.collisions import Collisions
+from nmm.control.functions.objectives.base import Objective
+from nmm.control.functions.tasks.task import Task
 from nmm.control.goal import Goal
-from nmm.control.limits import Limits, LimitsOn
-from nmm.functions.objectives.base import Objective
-from nmm.functions.tasks.task import Task
+from nmm.control.limits.collisions import Collisions
+from nmm.control.limits.limits import Limits, LimitsOn
 from nmm.model.collisions.scene import Scene
 from nmm.model.robots.robot import Robot
 from nmm.plans.following import FromPlan

@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, counted, positive, scalar
 from nmm.base.errors import InputError, NmmError, RunError, expect_kind, few
-from nmm.control.collisions import Collisions
+from nmm.control.functions.objectives.base import Objective
+from nmm.control.functions.tasks.task import Task
 from nmm.control.goal import Goal
-from nmm.control.limits import Limits
-from nmm.functions.objectives.base import Objective
-from nmm.functions.tasks.task import Task
+from nmm.control.limits.collisions import Collisions
+from nmm.control.limits.limits import Limits
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.collisions.scene import Scene
 from nmm.model.platforms.tractor import Tractor

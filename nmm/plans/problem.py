@@ -9,7 +9,7 @@ import numpy as np
 
 from nmm.base.arrays import Array
 from nmm.collisions.motion_check import MotionCheck
-from nmm.control.limits import LimitsOn
+from nmm.control.limits.limits import LimitsOn
 from nmm.model.platforms.tractor import Tractor
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.zero_order_hold import inputs_of

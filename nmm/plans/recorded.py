@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from nmm.base.arrays import Array
-from nmm.control.limits import LimitsOn
-from nmm.functions.tasks.task import Task
+from nmm.control.functions.tasks.task import Task
+from nmm.control.limits.limits import LimitsOn
 from nmm.model.collisions.scene import Scene
 from nmm.model.robots.frame_path import FramePath
 from nmm.model.robots.reach import first_tip

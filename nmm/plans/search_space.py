@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from nmm.base.arrays import Array
-from nmm.control.limits import LimitsOn
-from nmm.functions.tasks.task import Task
+from nmm.control.functions.tasks.task import Task
+from nmm.control.limits.limits import LimitsOn
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.collisions.shapes import HalfSpace
 from nmm.model.robots.robot import Robot

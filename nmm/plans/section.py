@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
 from pydantic import BeforeValidator, Field
 
 from nmm.base.errors import InputError, expect
-from nmm.functions.tasks.task import Task
+from nmm.control.functions.tasks.task import Task
 from nmm.scenario.keys import Part, at
 from nmm.scenario.limits import GoalPart, part_or_none
 from nmm.scenario.numbers import Number, Positive, Whole

@@ -12,7 +12,7 @@ from nmm.base.arrays import Array
 from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.record_layout import Memory, views
 from nmm.collisions.motion_check import MotionCheck
-from nmm.control.limits import LimitsOn
+from nmm.control.limits.limits import LimitsOn
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.wheel_rates import turning_wheels
 from nmm.plans.interior import SHOOT, shoot

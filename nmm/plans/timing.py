@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nmm.base.arrays import Array, Integers
-from nmm.control.limits import LimitsOn
+from nmm.control.limits.limits import LimitsOn
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.wheel_rates import turning_wheels
 from nmm.plans.path import Guide

@@ -14,7 +14,7 @@ from nmm.base.errors import RunError
 from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.record_layout import Memory, views
 from nmm.collisions.motion_check import MotionCheck
-from nmm.control.limits import LimitsOn
+from nmm.control.limits.limits import LimitsOn
 from nmm.model.platforms.tractor import Tractor
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.zero_order_hold import inputs_of

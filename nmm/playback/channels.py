@@ -10,7 +10,7 @@ import numpy as np
 from nmm.base.arrays import Array, Integers
 from nmm.base.findings.run import line
 from nmm.base.resolver_style import DASHES, Look, pretty, rate
-from nmm.control.quantities import Curve, RecordedQuantity, placed
+from nmm.control.step.quantities import Curve, RecordedQuantity, placed
 from nmm.diagnosis.jumps import chattering
 from nmm.diagnosis.limits import AT_LIMIT
 from nmm.diagnosis.motors import motor_findings, motor_torques

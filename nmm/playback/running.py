@@ -16,8 +16,8 @@ from nmm.base.ellipsoid_options import Wanted
 from nmm.base.errors import NmmError
 from nmm.base.resolver_style import looks_of_labels
 from nmm.control.controller import Controller
-from nmm.control.quantities import Record
-from nmm.control.recorded import Recorded
+from nmm.control.step.quantities import Record
+from nmm.control.step.recorded import Recorded
 from nmm.model.robots.frame_path import FramePath
 from nmm.model.robots.motion import Camera
 from nmm.model.robots.surroundings import NO_SURROUNDINGS, Surroundings

@@ -15,8 +15,8 @@ from nmm.base.ellipsoid_options import EllipsoidOptions
 from nmm.base.errors import InputError, SingularError, expect
 from nmm.base.resolver_style import looks
 from nmm.control.directions import WORLD_PARTS, direction_words, in_world_axes, readable_basis
-from nmm.functions.function import Function
-from nmm.functions.tasks.task import Task
+from nmm.control.functions.function import Function
+from nmm.control.functions.tasks.task import Task
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
 from nmm.playback.drawing import Command, Drawing, encode

@@ -12,9 +12,9 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array
-from nmm.functions.function import Function
-from nmm.functions.program import Program
-from nmm.functions.tasks.task import Stack, Task
+from nmm.control.functions.function import Function
+from nmm.control.functions.program import Program
+from nmm.control.functions.tasks.task import Stack, Task
 from nmm.model.robots.motion import Motion
 from nmm.model.robots.reach import first_tip, tips
 from nmm.model.robots.robot import Robot

@@ -13,8 +13,8 @@ from nmm.base.files import whole_file, written_at
 from nmm.base.kernels.compiled import compiled, compiled_without_gil, scratch, view
 from nmm.base.kernels.spectra import write_spectrum
 from nmm.base.machine import expect_memory
-from nmm.control.quantities import saved
-from nmm.control.recorded import Recorded
+from nmm.control.step.quantities import saved
+from nmm.control.step.recorded import Recorded
 
 #: Quantities of a sample that can be kept, named as in a trajectory.
 QUANTITIES = (*(one.name for one in saved() if one.noted), "believed")

@@ -11,7 +11,7 @@ import numpy as np
 from nmm.base.arrays import Array, Integers
 from nmm.base.errors import InputError, expect
 from nmm.base.findings import Finding
-from nmm.control.quantities import saved
+from nmm.control.step.quantities import saved
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
 from nmm.ros.recorded import Names, Recorded

@@ -11,7 +11,7 @@ import numpy as np
 from nmm.base.arrays import Array, Integers
 from nmm.control.controller import Controller
 from nmm.control.integrators import Around, Inputs, Integrator, Velocity
-from nmm.control.safety_filter import SafetyFilter
+from nmm.control.step.safety_filter import SafetyFilter
 from nmm.model.collisions.obstacle import Obstacle, as_passed, shifts
 from nmm.model.collisions.scene import Scene
 from nmm.model.robots.zero_order_hold import HeldInputs

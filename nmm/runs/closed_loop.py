@@ -15,8 +15,8 @@ from nmm.base.findings import Finding
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.integrators import Integrator
-from nmm.control.sample import Snapshot
-from nmm.control.step import Step
+from nmm.control.step.sample import Snapshot
+from nmm.control.step.step import Step
 from nmm.runs.compiled_loop import DIVERGED_BEYOND, CompiledLoop, compiled_loop
 from nmm.runs.leg import Leaving
 from nmm.runs.recording import Recorder

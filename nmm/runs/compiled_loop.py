@@ -23,16 +23,16 @@ from nmm.base.kernels.compiled import (
 )
 from nmm.base.kernels.record_layout import IntegerVector, Vector, keep, kept, put_back, record_type, views
 from nmm.control.controller import Controller
-from nmm.control.equations import ControlStep, call_step, watch_error
+from nmm.control.functions.program import BESIDE
 from nmm.control.goal import Goal, norms, unit_codes
 from nmm.control.integrators import Accelerated, Integrator
-from nmm.control.recorded import Recorded, note_held, note_sample
-from nmm.control.step_size import Descent, call_shorten, shorten
-from nmm.control.stepping import Tableau, end_stages, go_on, tableau
-from nmm.functions.program import BESIDE
-from nmm.resolvers.answer import SINGULAR_J
-from nmm.resolvers.base import State
-from nmm.resolvers.partitions import COLUMNS, FREE, HELD, MODE, OVERDUE, SIGN, PartitionState
+from nmm.control.resolvers.answer import SINGULAR_J
+from nmm.control.resolvers.base import State
+from nmm.control.resolvers.partitions import COLUMNS, FREE, HELD, MODE, OVERDUE, SIGN, PartitionState
+from nmm.control.step.equations import ControlStep, call_step, watch_error
+from nmm.control.step.recorded import Recorded, note_held, note_sample
+from nmm.control.step.step_size import Descent, call_shorten, shorten
+from nmm.control.step.stepping import Tableau, end_stages, go_on, tableau
 
 #: Coordinates or inputs whose norm is beyond this have diverged, m, rad, m/s or rad/s.
 DIVERGED_BEYOND = 1e6

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from nmm.base.arrays import Array
-from nmm.control.quantities import RecordedQuantity
+from nmm.control.step.quantities import RecordedQuantity
 from nmm.model.robots.robot import Robot
 from nmm.runs.trajectory import Trajectory
 

@@ -14,14 +14,14 @@ from nmm.base.findings import Finding
 from nmm.base.kernels.compiled import checked_by_caller, compiled, compiled_without_gil, scratch, view
 from nmm.base.kernels.record_layout import record_type, views
 from nmm.control.controller import Controller
-from nmm.control.equations import ControlStep, write_equation
+from nmm.control.functions.program import BESIDE, LaidOut, run_program
 from nmm.control.goal import Goal
 from nmm.control.integrators import Around, integrator
-from nmm.control.recorded import Recorded, note_sample
-from nmm.control.stepping import hold_inputs
-from nmm.functions.program import BESIDE, LaidOut, run_program
-from nmm.resolvers.answer import SINGULAR_J
-from nmm.resolvers.partitions import PartitionState
+from nmm.control.resolvers.answer import SINGULAR_J
+from nmm.control.resolvers.partitions import PartitionState
+from nmm.control.step.equations import ControlStep, write_equation
+from nmm.control.step.recorded import Recorded, note_sample
+from nmm.control.step.stepping import hold_inputs
 from nmm.runs.closed_loop import drive_loop, finding_in
 from nmm.runs.compiled_loop import DIVERGED_BEYOND, compiled_sample, within_bound
 from nmm.runs.disturbances import Disturbed, Plant

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from nmm.control.controller import Controller
-from nmm.control.quantities import QUANTITIES, saved
-from nmm.control.sequence import Schedule
+from nmm.control.sequencing.sequence import Schedule
+from nmm.control.step.quantities import QUANTITIES, saved
 from nmm.model.robots.robot import Robot
 from nmm.runs.clearance import Swept, swept
 from nmm.runs.leg import Leg

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from nmm.base.arrays import Array
 from nmm.control.controller import Controller
 from nmm.control.integrators import Integrator
-from nmm.control.sequence import Schedule
+from nmm.control.sequencing.sequence import Schedule
 from nmm.runs.recording import Recorder
 from nmm.runs.verdict import FindingLine, Outcome
 

@@ -13,7 +13,7 @@ from nmm.base.errors import RunError
 from nmm.base.findings import Finding
 from nmm.base.kernels.compiled import checked_by_caller
 from nmm.control.controller import Controller
-from nmm.control.recorded import NOTE_SAMPLE, Recorded, note_sample, room
+from nmm.control.step.recorded import NOTE_SAMPLE, Recorded, note_sample, room
 from nmm.runs.recording import Recorder
 from nmm.runs.trajectory import Trajectory
 from nmm.runs.verdict import Verdict

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from nmm.base.arrays import Array, Flags
-from nmm.control.limits import LimitsOn
-from nmm.functions.function import natural_size
+from nmm.control.functions.function import natural_size
+from nmm.control.limits.limits import LimitsOn
 from nmm.model.robots.robot import Robot
 
 #: The middle of a range, where what is far from a one-sided limit is placed.

@@ -12,9 +12,9 @@ from nmm.base.arrays import Array
 from nmm.base.findings import Finding
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
-from nmm.control.idle_inputs import idle_inputs
 from nmm.control.integrators import Accelerated, Integrator
 from nmm.control.standing_pose import standing_pose
+from nmm.control.step.idle_inputs import idle_inputs
 from nmm.model.robots.loading.ground import slip_warnings
 from nmm.model.robots.loading.provenance import provenance_of
 from nmm.runs.clearance import guarded

@@ -13,13 +13,13 @@ from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.spectra import spectra
 from nmm.base.machine import expect_memory
 from nmm.control.controller import Controller
-from nmm.control.limits import Limits
-from nmm.control.quantities import Record, saved
-from nmm.control.recorded import NOTE_HELD, Recorded, note_held, room
-from nmm.control.safety_filter import Counts
-from nmm.control.sequence import Event
-from nmm.control.step import Step
-from nmm.functions.program import COMPILED
+from nmm.control.functions.program import COMPILED
+from nmm.control.limits.limits import Limits
+from nmm.control.sequencing.sequence import Event
+from nmm.control.step.quantities import Record, saved
+from nmm.control.step.recorded import NOTE_HELD, Recorded, note_held, room
+from nmm.control.step.safety_filter import Counts
+from nmm.control.step.step import Step
 from nmm.runs.clearance import Swept, swept
 from nmm.runs.margins import margin, shares, standing
 from nmm.runs.residuals import residuals

@@ -8,7 +8,7 @@ import numpy as np
 
 from nmm.base.arrays import Array
 from nmm.base.findings import Finding
-from nmm.resolvers.answer import EXACT
+from nmm.control.resolvers.answer import EXACT
 
 
 class Residuals(NamedTuple):

@@ -9,11 +9,11 @@ import numpy as np
 
 from nmm.base.arrays import Array
 from nmm.base.errors import expect
-from nmm.control.limits import Limits
-from nmm.functions.function import Function, Sight
-from nmm.functions.program import Program
-from nmm.functions.tasks.image import optical_frame
-from nmm.functions.tasks.task import Task
+from nmm.control.functions.function import Function, Sight
+from nmm.control.functions.program import Program
+from nmm.control.functions.tasks.image import optical_frame
+from nmm.control.functions.tasks.task import Task
+from nmm.control.limits.limits import Limits
 from nmm.model.robots.motion import NORMALISED, PICTURE, Camera
 from nmm.model.robots.robot import Robot
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from nmm.base.arrays import Array
 from nmm.base.errors import expect
-from nmm.functions.function import Function, Shown
-from nmm.functions.tasks.position import AXES
-from nmm.functions.tasks.task import Task
+from nmm.control.functions.function import Function, Shown
+from nmm.control.functions.tasks.position import AXES
+from nmm.control.functions.tasks.task import Task
 from nmm.model.robots.frame_path import FramePath
 from nmm.model.robots.robot import Robot
 

@@ -16,7 +16,7 @@ from nmm.base.text_format import listed
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.integrators import STEPPING, Integrator, integrator
-from nmm.control.sequence import Schedule
+from nmm.control.sequencing.sequence import Schedule
 from nmm.runs.closed_loop import finding_in
 from nmm.runs.disturbances import Disturbances, Disturbed
 from nmm.runs.disturbed import check_disturbed, drive_disturbed

@@ -11,7 +11,7 @@ import numpy as np
 from nmm.base.errors import RunError
 from nmm.base.findings.run import MOTORS
 from nmm.base.text_format import apart
-from nmm.control.quantities import placed
+from nmm.control.step.quantities import placed
 
 if TYPE_CHECKING:
     from nmm.control.controller import Controller

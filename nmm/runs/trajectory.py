@@ -17,8 +17,8 @@ from nmm.base.findings import Finding
 from nmm.base.findings.run import line
 from nmm.base.lazy_call import lazy_call
 from nmm.base.machine import made_with
-from nmm.control.quantities import QUANTITIES, Record
-from nmm.control.sequence import Event
+from nmm.control.sequencing.sequence import Event
+from nmm.control.step.quantities import QUANTITIES, Record
 from nmm.model.collisions.obstacle import Obstacle, obstacle_places
 from nmm.model.robots.motion import Motion, Nearest
 from nmm.model.robots.robot import Robot
@@ -152,7 +152,7 @@ class Trajectory:
         return cls(**own, **rest, more={name: arrays[name] for name in arrays if name not in own})
 
     def __getitem__(self, name: str) -> Array:
-        """A recorded quantity by its name (`nmm.control.quantities`); `InputError` for what is none of it."""
+        """A recorded quantity by its name (`nmm.control.step.quantities`); `InputError` for what is none of it."""
         expect_known("quantity", name, [one.name for one in QUANTITIES.values() if one.saved or one.of])
         one, known = QUANTITIES[name], {**vars(self), **self.more}
         if name in known:

@@ -7,10 +7,10 @@ from pydantic import Field, create_model
 
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError
-from nmm.control.collisions import Collisions
-from nmm.functions.function import Function
-from nmm.functions.program import Program
-from nmm.functions.references.orientation import rotation_vector
+from nmm.control.functions.function import Function
+from nmm.control.functions.program import Program
+from nmm.control.functions.references.orientation import rotation_vector
+from nmm.control.limits.collisions import Collisions
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.collisions.shapes import Box, Capsule, ConvexMesh, Cylinder, HalfSpace, Shape, Sphere
 from nmm.model.robots.loading.packages import package_file

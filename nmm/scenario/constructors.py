@@ -35,7 +35,7 @@ from pydantic import (
 from pydantic_core import PydanticUndefined
 
 from nmm.base.errors import InputError
-from nmm.functions.function import Function
+from nmm.control.functions.function import Function
 from nmm.model.robots.robot import Robot
 from nmm.scenario.keys import Part, at
 from nmm.scenario.numbers import Number, NumberList, Whole, nested, number, numbers, numbers_by_name

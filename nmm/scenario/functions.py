@@ -15,10 +15,10 @@ from pydantic import (
 from nmm.base.arrays import Array, vector
 from nmm.base.errors import InputError, expect_known
 from nmm.base.kinds import REFERENCES, TASKS
-from nmm.functions.function import Function
-from nmm.functions.references.orientation import rotation_vector
-from nmm.functions.references.polynomial import Constant, Polynomial
-from nmm.functions.tasks.camera_faults import CameraFaults
+from nmm.control.functions.function import Function
+from nmm.control.functions.references.orientation import rotation_vector
+from nmm.control.functions.references.polynomial import Constant, Polynomial
+from nmm.control.functions.tasks.camera_faults import CameraFaults
 from nmm.scenario.constructors import FunctionPart, MadePart, Unit, keys_of, part_of
 from nmm.scenario.keys import KeyedError, OneOf, Part, at, is_path, references_of
 from nmm.scenario.numbers import NumberList, Numbers, Positive, numbers

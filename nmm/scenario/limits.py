@@ -7,8 +7,8 @@ from pydantic import BeforeValidator, Field
 
 from nmm.base.errors import InputError
 from nmm.control.goal import Goal
-from nmm.control.limited_function import Bound
-from nmm.control.limits import Limits
+from nmm.control.limits.limited_function import Bound
+from nmm.control.limits.limits import Limits
 from nmm.control.retreat import Retreat
 from nmm.control.steering import Steering
 from nmm.model.robots.robot import Robot

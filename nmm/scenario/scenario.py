@@ -20,9 +20,9 @@ from nmm.scenario.keys import KeyedError, NamedReferences, as_written, at, first
 if TYPE_CHECKING:
     from nmm import Plan
     from nmm.control.controller import Controller
+    from nmm.control.resolvers.base import Resolver
     from nmm.model.collisions.obstacle import Obstacle
     from nmm.model.robots.robot import Robot
-    from nmm.resolvers.base import Resolver
     from nmm.runs.recording import Recorder
     from nmm.runs.trajectory import Trajectory
     from nmm.scenario.sections import Motion

@@ -7,7 +7,7 @@ from pydantic import BeforeValidator, Field
 
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError, expect_known
-from nmm.functions.references.orientation import rotation_vector
+from nmm.control.functions.references.orientation import rotation_vector
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.surroundings import Body, Carried, Surroundings

@@ -11,15 +11,15 @@ from nmm.base.kinds import RESOLVERS
 from nmm.base.plugins import Addition
 from nmm.base.progress import Progress
 from nmm.base.text_format import listed as in_words
-from nmm.control.collisions import Collisions
 from nmm.control.controller import Controller
+from nmm.control.functions.tasks.task import Stack
 from nmm.control.goal import Goal
-from nmm.control.sequence import Sequence
+from nmm.control.limits.collisions import Collisions
+from nmm.control.resolvers.base import Resolver
 from nmm.control.sequenced import SequencedController
-from nmm.functions.tasks.task import Stack
+from nmm.control.sequencing.sequence import Sequence
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.semantics import POSTURE
-from nmm.resolvers.base import Resolver
 from nmm.scenario.collisions import CollisionsPart
 from nmm.scenario.disturbances import DisturbancesPart
 from nmm.scenario.functions import REFERENCE_PARTS

@@ -14,7 +14,7 @@ from nmm.base.errors import InputError
 from nmm.base.findings import Finding
 from nmm.base.plugins import Addition, additions, complain
 from nmm.base.progress import Progress
-from nmm.functions.tasks.task import Task
+from nmm.control.functions.tasks.task import Task
 from nmm.model.robots.robot import Robot
 from nmm.scenario.keys import KeyedError, Part
 

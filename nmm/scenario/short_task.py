@@ -9,9 +9,9 @@ from pydantic import ValidationError
 from nmm.base.errors import InputError, expect, expect_known
 from nmm.base.kinds import TASKS
 from nmm.base.text_format import counted, listed
-from nmm.functions.function import Function
-from nmm.functions.program import evaluate
-from nmm.functions.tasks.task import Task
+from nmm.control.functions.function import Function
+from nmm.control.functions.program import evaluate
+from nmm.control.functions.tasks.task import Task
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.reach import arm_branches, arm_end
 from nmm.model.robots.robot import Robot

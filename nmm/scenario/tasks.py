@@ -6,9 +6,9 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import BeforeValidator, Field
 
 from nmm.base.errors import InputError, expect_known, few
-from nmm.functions.function import Row
-from nmm.functions.tasks.conditions import After, Between, Condition, While
-from nmm.functions.tasks.task import Task
+from nmm.control.functions.function import Row
+from nmm.control.functions.tasks.conditions import After, Between, Condition, While
+from nmm.control.functions.tasks.task import Task
 from nmm.model.robots.robot import Robot
 from nmm.scenario.constructors import FunctionPart, keys_of
 from nmm.scenario.functions import FUNCTION_PARTS, Reference, with_functions

@@ -22,7 +22,7 @@ import numpy as np
 from nmm import __version__
 from nmm.base.errors import InputError, RunError
 from nmm.base.progress import Progress
-from nmm.control.quantities import placed
+from nmm.control.step.quantities import placed
 from nmm.diagnosis.summary import RUN_NUMBERS
 from nmm.scenario import Scenario
 from nmm.sweeps.definition import Definition, Listed

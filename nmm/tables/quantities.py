@@ -10,7 +10,7 @@ import numpy as np
 
 from nmm.base.errors import expect
 from nmm.base.latex import escaped
-from nmm.control.quantities import named_numbers
+from nmm.control.step.quantities import named_numbers
 from nmm.diagnosis.summary import RUN_NUMBERS
 from nmm.tables.table import Quantity, Table, Value
 

@@ -8,7 +8,7 @@ import numpy as np
 
 import nmm
 from check.verdicts import Matrix, Wrong, called, compared, exercise, in_degrees, numbers, shaped
-from nmm.resolvers import Problem
+from nmm.control.resolvers import Problem
 
 ROBOT = nmm.load("unicycle_2r")
 Q, U, HAND = ROBOT.q_names, ROBOT.u_names, ("ee.x", "ee.y")

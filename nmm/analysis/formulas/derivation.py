@@ -17,7 +17,7 @@ from nmm.analysis.formulas.tracing import traced
 from nmm.analysis.formulas.written import Auxiliary, Value, value_without
 from nmm.base.errors import InputError, expect, expect_known
 from nmm.base.findings import Finding
-from nmm.functions.tasks.task import Stack
+from nmm.control.functions.tasks.task import Stack
 from nmm.model.platforms.base import Platform
 from nmm.model.robots.robot import Robot
 

@@ -14,7 +14,7 @@ from nmm.analysis.formulas.symbolic_analysis import SymbolicAnalysis, assembled,
 from nmm.analysis.formulas.task_rows import frames_of
 from nmm.analysis.singular.jacobians import Jacobians, Tasks, stacked
 from nmm.base.errors import InputError, NmmError, SingularError, expect_known
-from nmm.functions.tasks.task import Stack
+from nmm.control.functions.tasks.task import Stack
 from nmm.model.robots.robot import Robot
 
 #: Products of terms that an analysis may take: some seconds.

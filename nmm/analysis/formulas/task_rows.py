@@ -17,13 +17,13 @@ from nmm.base.errors import InputError
 from nmm.base.kernels import records
 from nmm.base.kernels.records import Frames as Read
 from nmm.base.kernels.records import Rows
-from nmm.functions.function import Function, Stage
-from nmm.functions.references.circle import bearing
-from nmm.functions.tasks import Stack
-from nmm.functions.tasks.image import image_points, log_depth
-from nmm.functions.tasks.pointing import pointing
-from nmm.functions.tasks.pose import frame_pose, orientation_error, pose_error
-from nmm.functions.tasks.position import distance
+from nmm.control.functions.function import Function, Stage
+from nmm.control.functions.references.circle import bearing
+from nmm.control.functions.tasks import Stack
+from nmm.control.functions.tasks.image import image_points, log_depth
+from nmm.control.functions.tasks.pointing import pointing
+from nmm.control.functions.tasks.pose import frame_pose, orientation_error, pose_error
+from nmm.control.functions.tasks.position import distance
 from nmm.model.robots.robot import CENTER_OF_MASS, Robot
 
 #: For errors that are logarithms, the rows of the frame's velocity, linear over angular, that J has at 0.

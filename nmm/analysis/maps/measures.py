@@ -19,8 +19,8 @@ from nmm.base.arrays import Array, Integers, scalar
 from nmm.base.errors import expect, expect_known
 from nmm.base.progress import Progress, between
 from nmm.base.text_format import superscript
-from nmm.resolvers.base import Weights, weight_diagonal
-from nmm.resolvers.problem import Dimensions
+from nmm.control.resolvers.base import Weights, weight_diagonal
+from nmm.control.resolvers.problem import Dimensions
 
 #: So many configurations' J are held at a time.
 CHUNK = 1 << 14

@@ -23,9 +23,9 @@ from nmm.base.findings import Finding
 from nmm.base.kernels.rotations import exp3
 from nmm.base.progress import Progress, between
 from nmm.control.controller import Controller
-from nmm.functions.function import Function
-from nmm.functions.program import evaluate
-from nmm.functions.references import Bearing, Circle, PiecewisePolynomial, PoseReference
+from nmm.control.functions.function import Function
+from nmm.control.functions.program import evaluate
+from nmm.control.functions.references import Bearing, Circle, PiecewisePolynomial, PoseReference
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
 from nmm.runs.simulation import simulate

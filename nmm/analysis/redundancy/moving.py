@@ -33,17 +33,17 @@ from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.record_layout import views
 from nmm.base.text_format import listed
 from nmm.control.controller import Controller
-from nmm.control.equations import ControlStep
+from nmm.control.functions.program import BESIDE, COMPILED, evaluate
+from nmm.control.functions.references.polynomial import Constant
+from nmm.control.functions.tasks.task import Stack, Task
 from nmm.control.integrators import RK4
-from nmm.control.step import Step
+from nmm.control.resolvers.answer import Status
+from nmm.control.resolvers.projected_gradient import ProjectedGradient
+from nmm.control.step.equations import ControlStep
+from nmm.control.step.step import Step
 from nmm.diagnosis.diagnose import lines, noticed
-from nmm.functions.program import BESIDE, COMPILED, evaluate
-from nmm.functions.references.polynomial import Constant
-from nmm.functions.tasks.task import Stack, Task
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
-from nmm.resolvers.answer import Status
-from nmm.resolvers.projected_gradient import ProjectedGradient
 from nmm.runs.recording import Recorder
 from nmm.runs.trajectory import Trajectory
 from nmm.runs.verdict import Outcome, Verdict

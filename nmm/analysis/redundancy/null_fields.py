@@ -15,8 +15,8 @@ from nmm.base.errors import InputError, expect, expect_known
 from nmm.base.kernels.compiled import checked_by_caller, compiled, integer_scratch, scratch
 from nmm.base.kernels.linear_algebra import residual_norm, singular_rows
 from nmm.base.kernels.record_layout import IntegerVector, Vector, record_type, views
-from nmm.control.equations import ControlStep, drive
-from nmm.functions.program import BESIDE, LaidOut
+from nmm.control.functions.program import BESIDE, LaidOut
+from nmm.control.step.equations import ControlStep, drive
 from nmm.model.robots.robot import Robot
 
 #: The motion ends where a singular value that it needs is below this part of the largest.

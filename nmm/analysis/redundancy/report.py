@@ -19,11 +19,11 @@ from nmm.base.errors import SingularError
 from nmm.base.findings import Finding
 from nmm.control.controller import Controller
 from nmm.control.directions import direction_text
-from nmm.control.idle_inputs import inputs_without_effect
-from nmm.functions.program import Program
-from nmm.functions.tasks.task import Comparison
+from nmm.control.functions.program import Program
+from nmm.control.functions.tasks.task import Comparison
+from nmm.control.resolvers.projected_gradient import ProjectedGradient
+from nmm.control.step.idle_inputs import inputs_without_effect
 from nmm.model.robots.robot import Robot
-from nmm.resolvers.projected_gradient import ProjectedGradient
 
 #: Singular values of Lie brackets, which are taken by differences, this small beside the largest are zero.
 BRACKET_TOLERANCE = 1e-5

@@ -16,14 +16,14 @@ from nmm.base.kernels.record_layout import views
 from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.base.progress import Progress
 from nmm.control.controller import Controller
-from nmm.control.equations import ControlStep, write_equation
-from nmm.functions.function import Function, Row, Stage, row_scales
-from nmm.functions.program import BESIDE, COMPILED, LaidOut, run_program
-from nmm.functions.tasks.task import Stack, Task
+from nmm.control.functions.function import Function, Row, Stage, row_scales
+from nmm.control.functions.program import BESIDE, COMPILED, LaidOut, run_program
+from nmm.control.functions.tasks.task import Stack, Task
+from nmm.control.resolvers.projected_gradient import ProjectedGradient
+from nmm.control.resolvers.reduced_gradient import Partition
+from nmm.control.step.equations import ControlStep, write_equation
 from nmm.model.platforms.base import Platform
 from nmm.model.robots.robot import Robot
-from nmm.resolvers.projected_gradient import ProjectedGradient
-from nmm.resolvers.reduced_gradient import Partition
 
 #: What an analysis takes as the task: functions f(q) are enough, it needs no targets.
 Tasks: TypeAlias = Task | Function | Stack | Sequence[Task | Function]

@@ -36,9 +36,9 @@ from nmm.analysis.singular.parts import (
 )
 from nmm.base.arrays import Array, Integers, positive
 from nmm.control.directions import direction_texts
-from nmm.resolvers.partitions import candidate_columns
-from nmm.resolvers.problem import Dimensions
-from nmm.resolvers.reduced_gradient import ReducedGradient
+from nmm.control.resolvers.partitions import candidate_columns
+from nmm.control.resolvers.problem import Dimensions
+from nmm.control.resolvers.reduced_gradient import ReducedGradient
 
 #: Singular values this small beside the largest are zero; the resolvers' own tolerance.
 TOLERANCE = 1e-10

@@ -1,0 +1,1 @@
+"""What bounds the inputs: velocities, positions, accelerations, functions of q and distances."""

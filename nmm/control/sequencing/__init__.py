@@ -1,0 +1,1 @@
+"""Tasks that begin and end while the robot moves."""

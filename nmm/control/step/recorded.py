@@ -1,0 +1,137 @@
+"""What is recorded of each sample: one function writes it, for compiled loops and for `Step`s in Python."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numba import types
+
+from nmm.base.arrays import Array, Integers
+from nmm.base.kernels.compiled import call_platform, checked_by_caller, clear, compiled, scratch, view
+from nmm.base.kernels.linear_algebra import dot
+from nmm.base.kernels.record_layout import Blocks, Kind, record_type, views
+from nmm.control.functions.program import BESIDE, LaidOut
+from nmm.control.resolvers.answer import FALLBACK, added_residual
+from nmm.control.resolvers.partitions import COLUMNS
+from nmm.control.step.equations import ControlStep, drive
+from nmm.control.step.quantities import QUANTITIES
+
+#: The quantities that only a step knows: `note_sample` writes each.
+NOTED = tuple(one for one in QUANTITIES.values() if one.noted)
+
+if TYPE_CHECKING:
+    Recorded: TypeAlias = Any
+else:
+    #: The noted quantities of N samples, a field each, as records of kernels are.
+    Recorded = NamedTuple(
+        "Recorded",
+        [
+            (one.name, Annotated[Array, Kind(np.int64 if one.whole else np.float64, len(one.shape))])
+            for one in NOTED
+        ],
+    )
+
+
+def room(count: int, n: int, m: int, s: int, levels: int, limited: int) -> Recorded:
+    sizes = {"N": count, "n": n, "m": m, "s": s, "l": levels, "w": limited}
+    return Recorded._make(one.room(sizes) for one in NOTED)
+
+
+NOTE_SAMPLE = types.void(
+    *(types.int64[::1], types.float64[::1], types.float64[::1]),
+    *(types.int64, types.float64, types.int64, record_type(Recorded)),
+)
+
+
+@compiled
+def note_sample(
+    integers: Integers, floats: Array, q: Array, partitioned: int, share: float, k: int, found: Recorded
+) -> None:
+    """Write the sample just made at q, for which `share` of α was taken, as the k-th of a record."""
+    e = views(ControlStep, integers, floats, BESIDE)
+    b = views(LaidOut, integers, floats, 0).buffers
+    n, m, s = q.shape[0], e.answer.u.shape[0], e.task.r.shape[0]
+    for i in range(n):
+        found.q[k, i] = q[i]
+        found.q_dot[k, i] = e.q_dot[i]
+    second = e.second.u_dot.shape[0] > 0
+    for j in range(m):
+        found.u[k, j] = e.problem.before[j] if second else e.answer.u[j]
+        found.u_dot[k, j] = e.second.u_dot[j] if second else math.nan
+    for i in range(s):
+        found.r[k, i] = e.task.r[i]
+        found.r_d[k, i] = e.task.r_d[i]
+        found.error[k, i] = e.task.error[i]
+        found.rate[k, i] = e.task.full[i] - e.second.lead[i] if second else e.task.full[i]
+        found.partition[k, i] = e.state[COLUMNS + i] if partitioned == 1 else -1
+        for j in range(m):
+            found.J[k, i, j] = e.problem.J[i, j]
+    found.objective[k] = e.H[()]
+    found.residual[k] = e.answer.residual[()]
+    found.excess[k] = e.answer.excess[()]
+    found.step_size[k] = share
+    found.side[k] = int(e.answer.side[()])
+    found.added_residual[k] = added_residual(e.problem, e.answer.u)
+    for level in range(found.scale.shape[1]):
+        found.scale[k, level] = e.scale[level]
+    found.unanswered[k] = int(e.answer.status[()] == FALLBACK)
+    w = e.limits.spin.shape[0] if found.limited.shape[1] > 0 else 0
+    for i in range(w):
+        found.limited[k, i] = 0.0
+        for j in range(m):
+            found.limited[k, i] += e.problem.limit_rows[i, j] * found.u[k, j]
+    for i in range(w, found.limited.shape[1]):
+        found.limited[k, i] = b.value[e.limits.rows[i - w]]
+
+
+NOTE_HELD = types.void(
+    *(types.int64[::1], types.float64[::1], types.float64[::1], types.float64[::1]),
+    *(types.int64, record_type(Recorded)),
+)
+
+
+@compiled
+def note_held(integers: Integers, floats: Array, q: Array, u: Array, k: int, found: Recorded) -> None:
+    """Of the k-th sample, at q: the inputs u (m,) that are held after it, in place of its own."""
+    e = views(ControlStep, integers, floats, BESIDE)
+    b = views(LaidOut, integers, floats, 0)
+    G, G_q = scratch(b.buffers.G.shape), scratch((*b.buffers.G.shape, b.buffers.G.shape[0]))
+    clear(G)
+    clear(G_q)
+    call_platform(b.platform_kernel, q, b.platform_numbers, G, G_q)
+    drive(u, G, e.arm, view(found.q_dot, k * q.shape[0], (q.shape[0],)))
+    for j in range(u.shape[0]):
+        found.u[k, j] = u[j]
+    for i in range(e.limits.spin.shape[0] if found.limited.shape[1] > 0 else 0):
+        found.limited[k, i] = dot(e.problem.limit_rows[i], u)
+
+
+#: What no sample holds, as a float and as an integer.
+_BLANK = -(2**62)
+
+
+class OneSample:
+    """The last sample of a controller with these blocks, as `note_sample` writes it."""
+
+    def __init__(self, blocks: Blocks, *sizes: int) -> None:
+        self._blocks, self._found = blocks, room(1, *sizes)
+        self._note = checked_by_caller(note_sample, NOTE_SAMPLE)
+        by_name = self._found._asdict()
+        self._arrays = {name: values[0] for name, values in by_name.items() if values.ndim > 1}
+        self._numbers = {name: values for name, values in by_name.items() if values.ndim == 1}
+        for values in self._found:
+            values.fill(_BLANK)
+        self.noted(np.zeros(sizes[0]), 1.0)
+        for name, values in by_name.items():
+            if np.any(values == _BLANK):
+                raise TypeError(f"{name} is noted of each sample, but note_sample does not write it")
+
+    def noted(self, q: Array, share: float) -> dict[str, Any]:
+        """Copies of what the sample just made at q (n,) has, by name; without a partition."""
+        own = self._arrays["q"]
+        own[:] = q
+        self._note(*self._blocks, own, 0, share, 0, self._found)
+        noted = {name: values.copy() for name, values in self._arrays.items()}
+        return noted | {name: values.item() for name, values in self._numbers.items()}

@@ -1,0 +1,245 @@
+"""The records of a compiled step, laid out from a robot's tasks, objective, limits and distances."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from nmm.base.arrays import positive
+from nmm.base.errors import InputError, expect_kind, expect_known
+from nmm.base.kernels.parallel_compile import compile_in_parallel
+from nmm.base.kernels.record_layout import views
+from nmm.control.functions.function import Function, row_scales
+from nmm.control.functions.objectives.base import Objective
+from nmm.control.functions.program import BESIDE, COMPILED, PINOCCHIO, Buffers, Program
+from nmm.control.functions.tasks.task import Stack
+from nmm.control.limits.bounds import Clearance
+from nmm.control.limits.collisions import Collisions
+from nmm.control.limits.limits import Limits, LimitsOn
+from nmm.control.period_monitor import NOT_CALLED
+from nmm.control.resolvers.answer import unanswered
+from nmm.control.resolvers.base import Resolver, State
+from nmm.control.resolvers.problem import Dimensions, Problem
+from nmm.control.resolvers.problem_arrays import LOWER, UPPER
+from nmm.control.resolvers.saturation import limit
+from nmm.control.retreat import Retreat, retreat_numbers
+from nmm.control.steering import NOTHING, Steered, Steering
+from nmm.control.step.acceleration import accelerate, write_next_limits
+from nmm.control.step.bounded_step import write_clearance, write_limits
+from nmm.control.step.equations import Arm, ControlStep
+from nmm.control.step.equations import step as compiled_step
+from nmm.control.step.safety_filter import CUTS, MARGIN, Counts
+from nmm.control.step.step_records import SecondOrder, TaskRows
+from nmm.control.step.task_rows import task_functions, task_rows
+from nmm.model.collisions.rows import no_rows
+from nmm.model.robots.robot import Robot
+
+
+class Given(NamedTuple):
+    """The arguments of a controller, in the order of its constructor."""
+
+    robot: Robot
+    task: Stack
+    resolver: Resolver
+    objective: Objective | None
+    added_task: Stack
+    limits: Limits | None
+    dt: float | None
+    retreat: Retreat | None
+    steering: Steering | bool
+    collisions: Collisions | None
+    kinematics: str
+    order: int
+    servo: float
+
+
+#: Steps of second order's differences along the motion, s: of compiled rows, and of users' Python functions.
+BESIDE_BY, BESIDE_BY_IN_PYTHON = 1e-6, 1e-4
+#: k of second order, 1/s, unless given.
+SERVO = 5.0
+
+
+def checked(given: Given) -> Given:
+    """The same arguments; `InputError` for wrong kinds and combinations."""
+    kinds = {"objective": Objective, "retreat": Retreat, "limits": Limits, "collisions": Collisions}
+    optional = {name: kind for name, kind in kinds.items() if getattr(given, name) is not None}
+    steering = {} if isinstance(given.steering, bool) else {"steering": Steering}
+    for name, kind in ({"robot": Robot, "resolver": Resolver} | optional | steering).items():
+        expect_kind(getattr(given, name), kind, "controller", f"a {kind.__name__} as {name}")
+    expect_known("kinematics", given.kinematics, (PINOCCHIO, COMPILED), "controller")
+    if given.added_task.tasks and not given.resolver.takes_added_task:
+        raise InputError(f"resolver {given.resolver.name} takes none, ej does", where="added_task")
+    if given.order not in (1, 2):
+        raise InputError(where="order", expected="1, for inputs u, or 2, for u_dot", got=given.order)
+    if given.order == 2:
+        positive(given.servo, "servo")
+        step = getattr(given.resolver, "step", "constant")
+        there = {
+            "collisions": given.collisions,
+            "retreat": given.retreat,
+            f"resolver {given.resolver.name}: step": None if step == "constant" else step,
+        }
+        for name, one in there.items():
+            if one is not None:
+                raise InputError("is not known at order 2", where=name, expected="order 1, or none")
+    return given
+
+
+class LaidOut(NamedTuple):
+    """What a controller computes with.
+
+    program : the functions, in memory; step : what a step reads and writes besides them, as views
+    dimensions, state : of the resolver's problem, and what the resolver remembers
+    kept : the limits
+    terms : the objective's, with weights
+    steered : the steering law, if the equations have room for it
+    """
+
+    program: Program
+    step: ControlStep
+    dimensions: Dimensions
+    state: State
+    kept: LimitsOn
+    terms: tuple[tuple[float, Function], ...]
+    steered: Steered | None
+
+
+def lay_out(given: Given, steered: Steered | None) -> LaidOut:
+    """The memory of a `Controller`; `InputError` for what the robot lacks, or for too many rows."""
+    robot, task, resolver, objective, added_task, limits, *_ = given
+    collisions = given.collisions
+    limited = limits is not None or collisions is not None
+    second = given.order == 2
+    code, limits_code = (accelerate, write_next_limits) if second else (compiled_step, write_limits)
+    compile_in_parallel(*([limits_code] if limited else []), code, resolver.kernel)
+    rows, added_rows = task.rows(robot), added_task.rows(robot)
+    weighted = () if objective is None else objective.terms_on(robot)
+    functions, added = task_functions(task), task_functions(added_task)
+    kept = (Limits(False, False) if limits is None else limits).on(robot)
+    objectives = [function for _, function in weighted]
+    pursued = [] if steered is None else [steered.pursuit]
+    # At second order the rows that are differenced come first; their kinematics are compiled.
+    listed = [*functions, *added, *kept.functions, *objectives, *pursued]
+    program = Program(robot, listed, COMPILED if second else given.kinematics)
+    first = program.first_rows
+    after = len(functions) + len(added)
+    objective_at = after + len(kept.functions)
+    s, m = len(rows), robot.n_u
+    # The extended Jacobian needs a row for each steered input to be square.
+    held = np.zeros((0, m))
+    if steered is not None and resolver.takes_added_task:
+        if len(added_rows) + len(steered.inputs) == m - s:
+            held = np.eye(m)[[robot.input(name) for name in steered.inputs]]
+        else:
+            steered = None
+    near = no_rows(robot.n) if collisions is None else no_rows(robot.n, collisions.rows, CUTS)
+    problem = Problem(
+        J=np.zeros((s, m)),
+        rate=np.zeros(s),
+        h=np.zeros(m),
+        inputs=robot.u_names,
+        groups=robot.groups,
+        row_scales=row_scales(rows, robot),
+        levels=task.levels(robot),
+        added_J=np.vstack([np.zeros((len(added_rows), m)), held]),
+        added_rate=np.zeros(len(added_rows) + len(held)),
+        added_row_scales=np.append(row_scales(added_rows, robot), np.ones(len(held))),
+        falling=-kept.changes[:, 0],
+        rising=kept.changes[:, 1],
+        limit_rows=np.zeros((len(kept.rows) + len(near.d), m)),
+        limit_levels=[*(task.place(priority) for priority in kept.priorities), *(0 for _ in near.d)],
+    )
+    arrays = problem.arrays._replace(limiter=limit.address if limited else 0)
+    numbers = kept.numbers(first[after : after + len(kept.functions)], robot)
+    arrays.stops[m + len(numbers.spin) :] = UPPER + LOWER
+    dimensions = problem.dimensions
+    setup, state = resolver.setup(dimensions), resolver.start(dimensions)
+    differenced = len(kept.rows) + s + len(added_rows), objective_at
+    program.lay_out(
+        ControlStep(
+            near=near,
+            clearance=_clearance(collisions, len(kept.rows), len(near.d)),
+            task=task_rows(task, robot, first, kept.bounded),
+            added=task_rows(added_task, robot, first[len(functions) :], kept.bounded),
+            arm=Arm(robot.arm_coordinates, robot.following.table.ravel()),
+            terms=np.array(first[objective_at : objective_at + len(objectives)], dtype=np.int64),
+            weights=np.array([weight for weight, _ in weighted]),
+            H=np.array(0.0),
+            problem=arrays,
+            limits=numbers,
+            steering=NOTHING
+            if steered is None
+            else steered.numbers(first[-1], getattr(resolver, "alpha", 1.0)),
+            resolver=resolver.kernel.address,
+            numbers=setup.numbers,
+            options=setup.options,
+            state=state.memory,
+            answer=unanswered(m, len(dimensions.levels)),
+            scale=np.ones(len(dimensions.levels)),
+            q_dot=np.zeros(robot.n),
+            retreat=retreat_numbers(given.retreat, robot, rows),
+            period=NOT_CALLED,
+            second=_second(given, program, first, differenced, kept.bounded) if second else _first(),
+            step=code.address,
+            limits_code=limits_code.address if limited else 0,
+            clearance_code=write_clearance.address if len(near.d) else 0,
+        )
+    )
+    step = views(ControlStep, *program.blocks, BESIDE)
+    if second and program.calls_python:
+        step.second.h[()] = BESIDE_BY_IN_PYTHON
+    state.memory = step.state
+    return LaidOut(program, step, dimensions, state, kept, weighted, steered)
+
+
+def _second(
+    given: Given,
+    program: Program,
+    first: list[int],
+    differenced: tuple[int, int],
+    bounded: tuple[str, ...],
+) -> SecondOrder:
+    robot, (rows, functions) = given.robot, differenced
+    n, m = robot.n, robot.n_u
+    stages, buffers = program.rows_of(functions)
+    return SecondOrder(
+        servo=np.array(float(given.servo)),
+        h=np.array(BESIDE_BY),
+        share=np.array(1.0),
+        stages=stages,
+        buffers=buffers,
+        task=task_rows(given.task, robot, first, bounded),
+        added=task_rows(given.added_task, robot, first[len(task_functions(given.task)) :], bounded),
+        beside=np.zeros(n),
+        y=np.zeros((3, rows)),
+        D=np.zeros(rows),
+        lead=np.zeros(sum(given.task.levels(robot))),
+        lower=np.full(m, -np.inf),
+        upper=np.full(m, np.inf),
+        u_dot=np.zeros(m),
+    )
+
+
+def _first() -> SecondOrder:
+    """What takes the place of a record of second order at first order: nothing."""
+    shapes = [(0, 3, 4), (0, 6, 0), (0, 6, 0, 0), (0, 0), (0, 0, 0), (0,), (0,), (0, 0)]
+    none, cell = np.zeros(0), np.array(1.0)
+    integers = np.zeros(0, dtype=np.int64)
+    rows = TaskRows(integers.reshape(0, 3), np.zeros((0, 0)), none, none, integers, *(none for _ in range(4)))
+    buffers = Buffers(*(np.zeros(shape) for shape in shapes))
+    y = np.zeros((3, 0))
+    return SecondOrder(cell, cell, cell, 0, buffers, rows, rows, none, y, *(none for _ in range(5)))
+
+
+def _clearance(collisions: Collisions | None, first: int, count: int) -> Clearance:
+    kept = Collisions() if collisions is None else collisions
+    return Clearance(
+        first=np.array(first, dtype=np.int64),
+        distance=np.array(kept.distance),
+        margin=np.array(MARGIN),
+        gain=np.array(kept.gain),
+        recovery=np.array(kept.recovery),
+        braking=np.array(np.nan if kept.braking is None else kept.braking),
+        least=np.full(count, -np.inf),
+        held=np.array(0),
+        counts=np.zeros(len(Counts._fields), dtype=np.int64),
+    )
