@@ -17,8 +17,8 @@ import numpy as np
 
 import nmm
 from nmm.control.integrators import RK4
-from nmm.runs.closed_loop import drive_loop, sample_times
-from nmm.runs.recording import Recorder
+from nmm.motion.closed_loop import drive_loop, sample_times
+from nmm.motion.recording import Recorder
 
 ROBOTS, ROUNDS, STAGES = 64, 5, 4
 CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

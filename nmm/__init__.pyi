@@ -116,6 +116,10 @@ from .model.robots.loading import mount as mount
 from .model.robots.loading import pinocchio_model as pinocchio_model
 from .model.robots.loading import pinocchio_models as pinocchio_models
 from .model.robots.robot import Robot as Robot
+from .motion.disturbances import Disturbances as Disturbances
+from .motion.simulation import simulate as simulate
+from .motion.trajectory import Outcome as Outcome
+from .motion.trajectory import Trajectory as Trajectory
 from .plans.horizon import Horizon as Horizon
 from .plans.parking import Parking as Parking
 from .plans.plan import Plan as Plan
@@ -124,12 +128,8 @@ from .plans.replan import replan as replan
 from .robots.odometry import Odometry as Odometry
 from .rollouts.rollout import rollout as rollout
 from .ros.bag import read_bag as read_bag
-from .runs.disturbances import Disturbances as Disturbances
 from .runs.loop_state import LoopState as LoopState
 from .runs.robot_loop import Loop as Loop
-from .runs.simulation import simulate as simulate
-from .runs.trajectory import Outcome as Outcome
-from .runs.trajectory import Trajectory as Trajectory
 from .scaffold import first_scenario as first_scenario
 from .scenario import Scenario as Scenario
 from .sweeps import Sweep as Sweep

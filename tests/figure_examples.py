@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
-from nmm.runs.trajectory import Trajectory
+from nmm.motion.trajectory import Trajectory
 from nmm.scenario import Scenario
 
 PAPER = ["unicycle_2r_position", "unicycle_2r_pointing", "unicycle_2r_link_pointing", "unicycle_3r_position"]

@@ -20,8 +20,8 @@ from tornado.httpclient import HTTPRequest
 from tornado.websocket import WebSocketClientConnection, WebSocketClosedError, websocket_connect
 
 import nmm
+from nmm.motion.trajectory import Trajectory
 from nmm.playback import LiveRun
-from nmm.runs.trajectory import Trajectory
 
 #: The arrays of a page's commands.
 KINDS = {"f32": "<f4", "f64": "<f8", "u32": "<u4"}

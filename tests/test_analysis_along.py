@@ -16,7 +16,7 @@ from nmm.control.functions.tasks import Position
 from nmm.control.resolvers import ProjectedGradient
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot
-from nmm.runs.simulation import simulate
+from nmm.motion.simulation import simulate
 
 Array = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ from figure_examples import cut, run
 from playback_robot import drive, hand_built_robot
 
 from nmm.base.errors import InputError
+from nmm.motion.trajectory import Trajectory
 from nmm.playback import write_html
 from nmm.playback.channels import FPS, SEEN, Channel, channels
 from nmm.playback.keyframes import MOST_FRAMES
-from nmm.runs.trajectory import Trajectory
 from nmm.scenario import Scenario
 
 

@@ -22,7 +22,7 @@ from nmm.base.findings import Finding
 from nmm.cli.exit_status import status_of
 from nmm.control.functions.tasks import Heading, Position
 from nmm.model.robots.loading import load
-from nmm.runs.trajectory import Trajectory
+from nmm.motion.trajectory import Trajectory
 
 Command = Callable[..., Result]
 

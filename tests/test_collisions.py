@@ -299,7 +299,9 @@ def test_an_srdf_is_taken_and_told(robot, tmp_path):
 @pytest.mark.parametrize("sequenced", [False, True])
 def test_a_run_that_is_run_over_is_not_completed(robot, sequenced, monkeypatch):
     """A ball at 4 m/s comes from behind. No other dt is tried: that took up to a hundred times the run."""
-    monkeypatch.setattr("nmm.diagnosis.judgement.Trials", lambda *given: pytest.fail("it was tried again"))
+    monkeypatch.setattr(
+        "nmm.motion.diagnosis.judgement.Trials", lambda *given: pytest.fail("it was tried again")
+    )
     ball = nmm.Obstacle(nmm.Sphere(0.15), motion=lambda t: [-2.0 + 4.0 * t, 0.0, 0.15], name="ball")
     q0 = robot.q(START)
     hand = nmm.Configuration(robot, q0).placement("ee").translation[:2]

@@ -14,8 +14,8 @@ from findings import codes
 import nmm
 from nmm.base.kernels.compiled import Kernel
 from nmm.control.step.step_size import StepSize
-from nmm.runs import closed_loop
-from nmm.runs.compiled_loop import CompiledLoop
+from nmm.motion import closed_loop
+from nmm.motion.compiled_loop import CompiledLoop
 
 #: What a run promises to the last digits; a run of other quantities would not be the same run.
 QUANTITIES = ("t", "q", "u", "q_dot", "r", "r_d", "error", "objective", "residual", "scale", "partition")
@@ -316,7 +316,7 @@ def test_what_is_compiled_ahead_is_what_a_run_calls(monkeypatch: pytest.MonkeyPa
     """For arguments of other types it would be compiled again, while the run waits."""
     asked: list[Any] = []
     monkeypatch.setattr(
-        "nmm.diagnosis.compile_ahead.compile_in_parallel", lambda *wanted: asked.extend(wanted)
+        "nmm.motion.diagnosis.compile_ahead.compile_in_parallel", lambda *wanted: asked.extend(wanted)
     )
     assert nmm.Scenario.load("unicycle_2r_position", {"duration": 1.0}).run().complete
     called = [(one.compiled, one.signature) if isinstance(one, Kernel) else one for one in asked]

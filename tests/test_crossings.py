@@ -11,10 +11,10 @@ from findings import codes, the
 from scipy.optimize import brentq
 
 import nmm
-from nmm.diagnosis.jumps import crossings
+from nmm.motion import closed_loop
+from nmm.motion.diagnosis.jumps import crossings
+from nmm.motion.recording import crossed
 from nmm.playback.channels import channels, events
-from nmm.runs import closed_loop
-from nmm.runs.recording import crossed
 
 STOPPING = nmm.Scenario.load("unicycle_2r_algorithmic", {"resolver.singular": "stop"})
 

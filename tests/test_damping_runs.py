@@ -15,7 +15,7 @@ import nmm
 from nmm import Scenario
 from nmm.control.resolvers.answer import Status
 from nmm.control.resolvers.damped_least_squares import Damping
-from nmm.diagnosis.jumps import chattering
+from nmm.motion.diagnosis.jumps import chattering
 
 STRETCHED = {"unicycle_2r": ("xy", [2.0, 0.6]), "unicycle_3r": ("xyz", [1.0, 1.0, 1.2])}
 START = {"unicycle_2r": {"q1": 0.4, "q2": 1.2}, "unicycle_3r": {"q1": 0.4, "q2": 0.7, "q3": 0.8}}

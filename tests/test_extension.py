@@ -39,8 +39,8 @@ from nmm.control.resolvers.problem_arrays import ProblemArrays
 from nmm.model.platforms import Platform
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
-from nmm.runs.simulation import simulate
-from nmm.runs.trajectory import Trajectory
+from nmm.motion.simulation import simulate
+from nmm.motion.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 

@@ -25,8 +25,8 @@ from nmm.control.resolvers import ProjectedGradient
 from nmm.figures import style
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot
-from nmm.runs.simulation import simulate
-from nmm.runs.trajectory import Trajectory
+from nmm.motion.simulation import simulate
+from nmm.motion.trajectory import Trajectory
 from nmm.scenario import Scenario
 
 #: Where the packages of example-robot-data are.

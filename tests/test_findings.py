@@ -17,9 +17,9 @@ import nmm
 from nmm.base.findings import Finding, run, words
 from nmm.base.findings.run import line
 from nmm.cli import runs as commands
-from nmm.diagnosis.judgement import Trials
 from nmm.findings import bag, loop
-from nmm.runs.verdict import Awaited
+from nmm.motion.diagnosis.judgement import Trials
+from nmm.motion.verdict import Awaited
 
 PART = {"name": "q1", "t": 0.5, "value": 1.25, "unit": "rad", "lower": -1.0, "upper": 1.0}
 FLAW = {"meaning": "the task Jacobian J lost rank", "lost": ["tilt of tool about x"], "level": None}
@@ -659,7 +659,7 @@ def test_an_interrupt_while_a_run_is_judged_leaves_its_motion(
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("nmm.diagnosis.judgement.assess", interrupted)
+    monkeypatch.setattr("nmm.motion.diagnosis.judgement.assess", interrupted)
     run = missed(robot_2r)
     assert (run.outcome, len(run)) == (nmm.Outcome.INTERRUPTED, 101)
     assert why(run) == ["interrupted_judging"]

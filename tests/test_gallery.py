@@ -19,7 +19,7 @@ import nmm
 from nmm.base.bundled import bundled_scenarios
 from nmm.base.errors import InputError, RunError
 from nmm.cli.exit_status import status_of
-from nmm.runs.table import summary_rows
+from nmm.motion.table import summary_rows
 
 TWO = ("unicycle_2r_position", "unicycle_3r_out_of_reach")
 

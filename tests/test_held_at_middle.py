@@ -7,7 +7,7 @@ from findings import refused
 import nmm
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.zero_order_hold import HeldInputs
-from nmm.runs import closed_loop
+from nmm.motion import closed_loop
 
 DT = 0.01
 MIDDLE = "zoh_midpoint"

@@ -7,10 +7,10 @@ import pytest
 
 import nmm
 from nmm.control.step.idle_inputs import _configurations
-from nmm.diagnosis.assessment import linearisation, linearisations
-from nmm.diagnosis.error_bound import SAFETY, Feedback, Samples, step_errors
 from nmm.model.robots.frame_path import FramePath
 from nmm.model.robots.robot import CENTER_OF_MASS
+from nmm.motion.diagnosis.assessment import linearisation, linearisations
+from nmm.motion.diagnosis.error_bound import SAFETY, Feedback, Samples, step_errors
 
 CASES = ("unicycle_2r_position", "tiago_tray", "unicycle_2r_switching")
 

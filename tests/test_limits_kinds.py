@@ -15,8 +15,8 @@ from gripping import FINGERS, panda
 
 import nmm
 from nmm.model.robots.robot import Robot
+from nmm.motion.margins import margin, shares
 from nmm.playback.rolling import Rolling
-from nmm.runs.margins import margin, shares
 
 Array = np.ndarray
 DT = 0.01

@@ -7,7 +7,7 @@ import pytest
 from findings import codes
 
 import nmm
-from nmm.diagnosis.jumps import STEPS, moving_otherwise
+from nmm.motion.diagnosis.jumps import STEPS, moving_otherwise
 
 T = np.linspace(0.0, 1.0, 101)
 

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from nmm.base.kernels import compiled, numba_internals
+from nmm.motion.trajectory import Trajectory
 from nmm.paper.cases import CASES
-from nmm.runs.trajectory import Trajectory
 from nmm.scenario import Scenario
 
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")

@@ -19,10 +19,10 @@ from urdf_parts import robot as urdf
 import nmm
 from nmm.control.directions import in_world_axes, lost_directions
 from nmm.control.resolvers import Answer, Problem, Status
-from nmm.diagnosis.error_bound import Feedback, accumulated, decay, expected_decay
-from nmm.diagnosis.jumps import chattering
 from nmm.model.robots.reach import joint_position, reach
 from nmm.model.robots.robot import Robot
+from nmm.motion.diagnosis.error_bound import Feedback, accumulated, decay, expected_decay
+from nmm.motion.diagnosis.jumps import chattering
 
 START = {"x": -1, "y": -1, "theta": pi}
 TIP = nmm.Task(nmm.Position("ee", "xy"), nmm.Circle([2, 2], 3, 0.08 * pi, 5 / 4 * pi))

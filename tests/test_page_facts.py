@@ -14,9 +14,9 @@ from playback_browser import watched
 from playwright.sync_api import Page
 
 import nmm
+from nmm.motion.trajectory import Outcome, Trajectory
 from nmm.playback import write_html
 from nmm.playback.channels import MOST, channels, events
-from nmm.runs.trajectory import Outcome, Trajectory
 
 
 def run(name: str, **settings: object) -> Trajectory:

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from nmm.runs.trajectory import Trajectory
+from nmm.motion.trajectory import Trajectory
 from nmm.scenario import Scenario
 
 SCENARIOS = {

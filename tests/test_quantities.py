@@ -22,10 +22,10 @@ from nmm.base.arrays import Array, Integers
 from nmm.control.step.quantities import QUANTITIES, Curve, Number, Record, RecordedQuantity, saved
 from nmm.control.step.recorded import Recorded
 from nmm.control.step.step import Step
-from nmm.diagnosis.summary import RUN_NUMBERS
+from nmm.motion.diagnosis.summary import RUN_NUMBERS
+from nmm.motion.table import summary_rows
 from nmm.playback.channels import channels
 from nmm.playback.running import Growing
-from nmm.runs.table import summary_rows
 from nmm.sweeps.rows import MEASURED
 from nmm.tables import comparison_table
 

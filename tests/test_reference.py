@@ -16,7 +16,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import nmm
-from nmm.runs.recording import Recorder
+from nmm.motion.recording import Recorder
 
 ROOT = Path(__file__).resolve().parent.parent
 #: Packages whose names are public; those that `nmm` or `nmm.extending` has too are listed there.

@@ -7,7 +7,7 @@ import pytest
 from findings import codes, the
 
 import nmm
-from nmm.runs import disturbed
+from nmm.motion import disturbed
 
 LIMITS = nmm.Limits(velocity={"platform": 1.0, "arm": 1.5}, acceleration={"platform": 1.0, "arm": 3.0})
 WALL = nmm.Obstacle(nmm.Box([0.2, 4.0, 2.0]), [3.0, 0.0, 0.5], name="wall")

@@ -31,9 +31,9 @@ from nmm.control.resolvers.base import RESOLVER, Resolver, Setup, State
 from nmm.control.resolvers.problem import Dimensions
 from nmm.control.resolvers.problem_arrays import ProblemArrays
 from nmm.control.step.idle_inputs import idle_inputs
-from nmm.runs import closed_loop
-from nmm.runs.compiled_loop import CompiledLoop
-from nmm.runs.recording import Recorder
+from nmm.motion import closed_loop
+from nmm.motion.compiled_loop import CompiledLoop
+from nmm.motion.recording import Recorder
 
 ROBOT = nmm.load("unicycle_2r")
 Q0 = ROBOT.q({"q1": 0.5, "q2": 0.7})

@@ -9,8 +9,8 @@ from numpy import pi
 
 import nmm
 from nmm.control.integrators import METHODS
-from nmm.diagnosis.assessment import instabilities
 from nmm.model.robots.robot import Robot
+from nmm.motion.diagnosis.assessment import instabilities
 
 START = {"x": -1, "y": -1, "theta": pi}
 CIRCLE = nmm.Circle([2, 2], 3, 0.08 * pi, 5 / 4 * pi)

@@ -21,7 +21,7 @@ import nmm
 from nmm.analysis.redundancy import repeatability
 from nmm.base import latex
 from nmm.cli.exit_status import status_of
-from nmm.runs.verdict import Verdict
+from nmm.motion.verdict import Verdict
 from nmm.tables import Quantity, Table, comparison_table, laps_table
 
 Command = Callable[..., Result]

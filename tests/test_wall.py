@@ -25,11 +25,11 @@ EXCEPTIONS = {
         "compile_in_parallel",
     ): "what a run needs is compiled beforehand, in other processes",
     (
-        "nmm.runs.compiled_loop",
+        "nmm.motion.compiled_loop",
         "ADVANCE_SAMPLES",
     ): "what a run needs is compiled beforehand, in other processes",
     (
-        "nmm.runs.compiled_loop",
+        "nmm.motion.compiled_loop",
         "advance_samples",
     ): "what a run needs is compiled beforehand, in other processes",
     ("nmm.control.step.equations", "step"): "what a run needs is compiled beforehand, in other processes",

@@ -20,9 +20,9 @@ from nmm.base.processes import share_out
 from nmm.base.progress import Progress, between
 from nmm.figures import save, stroboscopic
 from nmm.folders.whole import FolderKind, replaced_folder
+from nmm.motion.table import summary_rows
 from nmm.playback.html import page_of, viewer_script
 from nmm.rendering.chromium import HeadlessPage
-from nmm.runs.table import summary_rows
 
 #: Marks a folder as one of ours.
 FORMAT, MARKER = "nmm gallery 1", "gallery.json"

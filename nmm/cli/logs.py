@@ -37,8 +37,8 @@ def export(
     nmm export runs/unicycle_2r_position-rg --mcap
     nmm export runs/unicycle_2r_position-rg --mcap here.mcap --start 1700000000
     """
+    from nmm.motion.trajectory import Trajectory
     from nmm.ros.description import packaged
-    from nmm.runs.trajectory import Trajectory
 
     if not mcap:
         raise InputError("say what to write", where="nmm export", expected="--mcap")
@@ -100,9 +100,9 @@ def compare_with_bag(source: str, bag: Path, out: Path | None, names: LogOptions
     """Tell how far a bag's motion is from a run's, and write both as a comparison."""
     from nmm.folders import comparison
     from nmm.folders.whole import check_folder
+    from nmm.motion.trajectory import Trajectory
     from nmm.ros.bag import read_bag
     from nmm.ros.difference import difference
-    from nmm.runs.trajectory import Trajectory
 
     run = Trajectory.load(source)
     folder = out or Path("runs") / f"{Path(source).resolve().name}-compare"

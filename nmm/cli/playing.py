@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from nmm.driving.setups import DriveSetup
     from nmm.model.robots.motion import Motion
     from nmm.model.robots.robot import Robot
-    from nmm.runs.trajectory import Trajectory
+    from nmm.motion.trajectory import Trajectory
     from nmm.scenario import Scenario
 
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A folder of `nmm run` or `nmm compare`.")]
@@ -81,7 +81,7 @@ def runs_in(folder: Path) -> list[Trajectory]:
     """The run of a folder, or those of a comparison, that have samples; `InputError` for none."""
     from nmm.folders import comparison
     from nmm.folders.whole import steady
-    from nmm.runs.trajectory import Trajectory
+    from nmm.motion.trajectory import Trajectory
 
     def read() -> list[Trajectory]:
         folders = comparison.runs_of(folder) if comparison.is_comparison(folder) else [folder]

@@ -45,9 +45,9 @@ from nmm.cli.output import FAILED, OK, complain, print_table, progress, show_tab
 
 if TYPE_CHECKING:
     from nmm.control.controller import Controller
+    from nmm.motion.recording import Recorder
+    from nmm.motion.trajectory import Trajectory
     from nmm.playback import LiveRun
-    from nmm.runs.recording import Recorder
-    from nmm.runs.trajectory import Trajectory
     from nmm.scenario import Scenario
 
 
@@ -179,7 +179,7 @@ def compare(
     """
     from nmm.folders import comparison
     from nmm.folders.whole import check_folder
-    from nmm.runs.table import step_time
+    from nmm.motion.table import step_time
 
     if str(bag).partition(":")[0] in RESOLVERS and resolvers.endswith(","):
         raise InputError(f"no blanks in --resolvers {resolvers}{bag}")
@@ -296,7 +296,7 @@ def _run(
     label: str = "",
 ) -> Trajectory:
     from nmm.base.findings import Finding
-    from nmm.runs.verdict import Outcome, Verdict
+    from nmm.motion.verdict import Outcome, Verdict
 
     with progress(f"{scenario.name}, {label or _called(scenario)}") as report:
         trajectory = replace(scenario.run(report, controller, watch), label=label)
@@ -340,7 +340,7 @@ def show_run(trajectory: Trajectory, numbers: dict[str, Any]) -> int:
 
 def describe(trajectory: Trajectory, numbers: dict[str, Any]) -> list[tuple[str, str]]:
     """Labels and values of a run's summary; its warnings go to standard error."""
-    from nmm.runs.table import summary_rows
+    from nmm.motion.table import summary_rows
 
     for warning in numbers["warnings"]:
         warn(f"{trajectory.called}: {warning}")

@@ -18,7 +18,7 @@ from nmm.base.findings.singularities import named_or_counted
 from nmm.base.latex import block, minor_name
 from nmm.cli.document import Item, Table, fields, number, rounded
 from nmm.cli.singularity_report import header, sizes, subject_data, without_twins
-from nmm.runs.trajectory import Trajectory
+from nmm.motion.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from nmm.cli.subjects import Studied

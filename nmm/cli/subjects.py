@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from nmm.control.functions.function import Function
     from nmm.control.functions.tasks import Stack, Task
     from nmm.model.robots.robot import Robot
-    from nmm.runs.trajectory import Trajectory
+    from nmm.motion.trajectory import Trajectory
     from nmm.scenario import Scenario
 
 #: The arguments of `nmm.load` that a scenario's robot takes, too.
@@ -169,7 +169,7 @@ def opened(
     """The run, the scenario and the robot of SOURCE; run and scenario where it is one."""
     from nmm.base.bundled import bundled_robots, bundled_scenarios
     from nmm.model.robots.loading import load
-    from nmm.runs.trajectory import Trajectory
+    from nmm.motion.trajectory import Trajectory
     from nmm.scenario import Scenario
     from nmm.scenario.keys import older_names
 

@@ -22,13 +22,13 @@ from nmm.driving.driven import Driven, Look, Made
 from nmm.driving.planning import Planning, later, why
 from nmm.driving.setups import Choice, DriveSetup, named
 from nmm.model.robots.motion import Camera
+from nmm.motion.components import Axes
+from nmm.motion.seen import SeenPoints
 from nmm.playback.cameras import live_numbers
 from nmm.playback.channels import live_channels
 from nmm.playback.drawing import Drawing, encode
 from nmm.playback.server import Visitor
 from nmm.playback.session import FPS, RobotSession
-from nmm.runs.components import Axes
-from nmm.runs.seen import SeenPoints
 
 #: Samples that a new page gets, at FPS.
 KEPT = int(30 * FPS)

@@ -16,7 +16,7 @@ from nmm.control.functions.references.live_target import Displaced, LiveTarget
 from nmm.control.functions.tasks.task import Stack
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
-from nmm.runs.seen import same_point
+from nmm.motion.seen import same_point
 
 
 class Thing:

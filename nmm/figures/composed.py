@@ -13,14 +13,14 @@ from nmm.base import resolver_style
 from nmm.base.arrays import Array
 from nmm.base.ellipsoid_options import Wanted
 from nmm.base.figure_options import PLAIN, FigureOptions
-from nmm.diagnosis.summary import BAND, settling_time
 from nmm.figures import curves, style
 from nmm.figures.limits import clearance, draw_scale, has_clearance, has_limits, limits
 from nmm.figures.motion import Scene, stroboscopic
 from nmm.figures.objective import draw_best_objective, has_objective, longest, objective_comparison
 from nmm.figures.style import save_as
 from nmm.figures.views import Paths, draw_views
-from nmm.runs.trajectory import Trajectory
+from nmm.motion.diagnosis.summary import BAND, settling_time
+from nmm.motion.trajectory import Trajectory
 
 #: Width of a figure of two columns, in.
 _WIDTH = 10.4

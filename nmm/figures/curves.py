@@ -15,8 +15,8 @@ from nmm.base import resolver_style
 from nmm.base.arrays import Array
 from nmm.control.step.quantities import QUANTITIES
 from nmm.figures import style
-from nmm.runs.components import components
-from nmm.runs.trajectory import Trajectory
+from nmm.motion.components import components
+from nmm.motion.trajectory import Trajectory
 
 #: Errors below this fraction of the largest are rounding, and are left out of the fit.
 _FLOOR = 1e-9

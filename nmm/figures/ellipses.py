@@ -26,9 +26,9 @@ from nmm.figures.silhouette import Ink, Silhouette
 from nmm.figures.style import save
 from nmm.figures.views import ABOVE, View, Viewed, page, upright
 from nmm.model.robots.motion import Motion
+from nmm.motion.trajectory import Trajectory
 from nmm.playback.extent import extent_of
 from nmm.playback.keyframes import ghost_samples
-from nmm.runs.trajectory import Trajectory
 
 #: At most and at least so many instants with ellipses, and at how many of them the robot is drawn.
 MOST, LEAST, ROBOTS = 12, 6, 5

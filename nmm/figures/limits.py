@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from nmm.base import resolver_style
 from nmm.figures import style
 from nmm.model.robots.wheel_rates import wheel_rates
-from nmm.runs.trajectory import Trajectory
+from nmm.motion.trajectory import Trajectory
 
 #: A limit counts as near within this share of its range.
 NEAR = 0.05

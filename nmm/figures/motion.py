@@ -19,8 +19,8 @@ from nmm.figures.silhouette import Ink, Pose, Silhouette, hull, outline_points
 from nmm.figures.time_labels import SIZE, Ground, Place, Subject, places
 from nmm.figures.views import ABOVE, View, Viewed, page, upright
 from nmm.model.robots.frame_path import FramePath
+from nmm.motion.trajectory import Trajectory
 from nmm.playback.placements import base_position
-from nmm.runs.trajectory import Trajectory
 
 #: Size of the marks at the path's ends, pt.
 _END = 6.0

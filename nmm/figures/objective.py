@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from nmm.base import resolver_style
 from nmm.base.arrays import Array
 from nmm.figures import style
-from nmm.runs.trajectory import Trajectory
+from nmm.motion.trajectory import Trajectory
 
 #: A logarithmic axis shows H down to this fraction of its largest value.
 _FLOOR = 1e-8

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from nmm.base import resolver_style
 from nmm.base.arrays import Array
-from nmm.runs.trajectory import Trajectory
+from nmm.motion.trajectory import Trajectory
 
 #: Size of the mark of a point that stands, and of where one that moves is at an instant, pt.
 _MARK, _DOT = 6.5, 3.5

@@ -22,7 +22,7 @@ from nmm.base.figure_options import FORMATS, FigureOptions
 from nmm.base.files import written_at
 from nmm.base.resolver_style import BLACK, CYCLE, DASHES, GREEN, ORANGE, PINK, Look
 from nmm.base.text_format import listed, printable, superscript
-from nmm.runs.trajectory import Trajectory
+from nmm.motion.trajectory import Trajectory
 
 GREY, LIGHT = "#6B7280", "#E5E7EB"
 DPI = 180

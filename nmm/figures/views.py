@@ -13,8 +13,8 @@ from nmm.base import resolver_style
 from nmm.base.arrays import Array
 from nmm.figures import style
 from nmm.figures.seen_points import SeenPoints
+from nmm.motion.trajectory import Trajectory
 from nmm.playback.placements import base_position
-from nmm.runs.trajectory import Trajectory
 
 #: Room for the x axis' label between two views, in, and between two ticks.
 _BETWEEN, _TICKS = 0.2, 0.25

@@ -14,7 +14,7 @@ from nmm.folders.whole import FolderKind, replaced_folder
 
 if TYPE_CHECKING:
     from nmm.base.ellipsoid_options import Wanted
-    from nmm.runs.trajectory import Trajectory
+    from nmm.motion.trajectory import Trajectory
 
 is_comparison = FolderKind("nmm comparison 1")
 

@@ -14,7 +14,6 @@ import yaml
 from nmm.base.errors import InputError, RobotError, expect
 from nmm.base.figure_options import Drawn, drawn_as
 from nmm.control.step.quantities import placed, saved
-from nmm.diagnosis.summary import FORMAT
 from nmm.folders.whole import FolderKind, replaced_folder, steady
 from nmm.model.collisions.obstacle import (
     obstacle_as_json,
@@ -22,16 +21,17 @@ from nmm.model.collisions.obstacle import (
     obstacle_places,
     shape_from_json,
 )
-from nmm.runs.components import components
-from nmm.runs.residuals import Residuals
+from nmm.motion.components import components
+from nmm.motion.diagnosis.summary import FORMAT
+from nmm.motion.residuals import Residuals
 
 if TYPE_CHECKING:
     from nmm.base.ellipsoid_options import Wanted
     from nmm.folders.schema import ToldObstacle, ToldRun
     from nmm.model.collisions.obstacle import Obstacle
     from nmm.model.robots.robot import Robot
-    from nmm.runs.seen import RunCamera
-    from nmm.runs.trajectory import Trajectory
+    from nmm.motion.seen import RunCamera
+    from nmm.motion.trajectory import Trajectory
 #: More samples take seconds to write, which is logged.
 MANY = 50_000
 ROWS = 10_000
@@ -96,8 +96,8 @@ def _loaded(folder: Path, robot: Robot | None) -> Trajectory:
     from nmm.control.sequencing.sequence import Event
     from nmm.folders.schema import ToldRun, check_arrays, read_arrays, read_checked
     from nmm.model.robots.loading import load as load_robot
-    from nmm.runs.trajectory import Trajectory
-    from nmm.runs.verdict import verdict_of
+    from nmm.motion.trajectory import Trajectory
+    from nmm.motion.verdict import verdict_of
     from nmm.scenario import Scenario
     from nmm.scenario.keys import older_names
 
@@ -157,7 +157,7 @@ def _loaded(folder: Path, robot: Robot | None) -> Trajectory:
 
 def _cameras(told: ToldRun, arrays: Mapping[str, Any], summary: Path) -> tuple[RunCamera, ...]:
     """The cameras of a summary; InputError for points that were not seen, or rows that the task lacks."""
-    from nmm.runs.seen import GoalRows, RunCamera
+    from nmm.motion.seen import GoalRows, RunCamera
 
     seen, rows = arrays["seen"], range(len(told.r_names))
     points = range(0 if seen is None else seen.shape[1])

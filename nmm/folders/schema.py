@@ -16,8 +16,8 @@ from nmm.base.machine import SHARE, free_memory
 from nmm.base.text_format import one_line, printable
 from nmm.control.step.quantities import saved
 from nmm.folders.whole import MOST
-from nmm.runs.residuals import NO_RESIDUALS
-from nmm.runs.trajectory import Outcome
+from nmm.motion.residuals import NO_RESIDUALS
+from nmm.motion.trajectory import Outcome
 from nmm.scenario.keys import first_error
 from nmm.scenario.yaml_text import dotted
 

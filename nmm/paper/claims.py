@@ -13,7 +13,7 @@ from nmm.paper.cases import Case, Claim, Row
 
 if TYPE_CHECKING:
     from nmm.control.controller import Controller
-    from nmm.runs.trajectory import Trajectory
+    from nmm.motion.trajectory import Trajectory
 
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 #: Centre (m) and radius (m) of the circle of eq. (16).

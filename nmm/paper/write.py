@@ -16,9 +16,9 @@ from nmm.base.processes import share_out
 from nmm.base.progress import Progress, between
 from nmm.base.templates import template
 from nmm.folders.whole import FolderKind, replaced_folder
+from nmm.motion.trajectory import Outcome, Trajectory
 from nmm.paper.cases import CASES, DT, RESOLVERS, Case, CaseResult, Claim
 from nmm.paper.claims import claims, smallest_determinant, table
-from nmm.runs.trajectory import Outcome, Trajectory
 
 if TYPE_CHECKING:
     from nmm.scenario import Scenario

@@ -20,6 +20,8 @@ from nmm.control.limits.limits import Limits
 from nmm.model.collisions.obstacle import shifts
 from nmm.model.robots.joint_table import as_row
 from nmm.model.robots.robot import Robot
+from nmm.motion.trajectory import Outcome, Trajectory
+from nmm.motion.verdict import Verdict
 from nmm.plans.following import differences
 from nmm.plans.goals import TaskError, goal_task
 from nmm.plans.interior import SHOOT, shoot
@@ -28,8 +30,6 @@ from nmm.plans.problem import END, MARGIN, largest_inputs, shooting_problem
 from nmm.plans.recorded import recorded
 from nmm.plans.samples import SampledMotion, Samples
 from nmm.plans.shooting import LOOK, Shooting, first_blocked_sample
-from nmm.runs.trajectory import Outcome, Trajectory
-from nmm.runs.verdict import Verdict
 
 #: Speeds of inputs without limits, m/s and rad/s.
 USUAL = 1.0

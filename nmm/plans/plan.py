@@ -18,12 +18,12 @@ from nmm.control.limits.collisions import Collisions
 from nmm.control.limits.limits import Limits, LimitsOn
 from nmm.model.collisions.scene import Scene
 from nmm.model.robots.robot import Robot
+from nmm.motion.trajectory import Trajectory
 from nmm.plans.following import FromPlan
 from nmm.plans.goals import Wanted, goal_task
 from nmm.plans.objective import SampleCosts
 from nmm.plans.recorded import recorded
 from nmm.plans.samples import SampledMotion
-from nmm.runs.trajectory import Trajectory
 
 
 class Motion(Protocol):

@@ -13,13 +13,13 @@ from nmm.model.collisions.scene import Scene
 from nmm.model.robots.frame_path import FramePath
 from nmm.model.robots.reach import first_tip
 from nmm.model.robots.robot import Robot
+from nmm.motion.clearance import swept
+from nmm.motion.margins import margin, shares, standing
+from nmm.motion.seen import SeenPoints
+from nmm.motion.shown_frame import shown_frame
+from nmm.motion.trajectory import Trajectory
+from nmm.motion.verdict import AS_ASKED, Verdict
 from nmm.plans.goals import TaskError
-from nmm.runs.clearance import swept
-from nmm.runs.margins import margin, shares, standing
-from nmm.runs.seen import SeenPoints
-from nmm.runs.shown_frame import shown_frame
-from nmm.runs.trajectory import Trajectory
-from nmm.runs.verdict import AS_ASKED, Verdict
 
 
 def recorded(

@@ -11,17 +11,17 @@ from nmm.base.arrays import Array, Integers
 from nmm.base.findings.run import line
 from nmm.base.resolver_style import DASHES, Look, pretty, rate
 from nmm.control.step.quantities import Curve, RecordedQuantity, placed
-from nmm.diagnosis.jumps import chattering
-from nmm.diagnosis.limits import AT_LIMIT
-from nmm.diagnosis.motors import motor_findings, motor_torques
-from nmm.diagnosis.summary import settling_time, summarise
 from nmm.model.robots.motion import Motion
 from nmm.model.robots.robot import Robot
+from nmm.motion.components import Axes, components
+from nmm.motion.diagnosis.jumps import chattering
+from nmm.motion.diagnosis.limits import AT_LIMIT
+from nmm.motion.diagnosis.motors import motor_findings, motor_torques
+from nmm.motion.diagnosis.summary import settling_time, summarise
+from nmm.motion.table import summary_rows
+from nmm.motion.trajectory import Trajectory
 from nmm.playback.drawing import Drawing, packed
 from nmm.playback.keyframes import MOST_FRAMES, samples_kept
-from nmm.runs.components import Axes, components
-from nmm.runs.table import summary_rows
-from nmm.runs.trajectory import Trajectory
 
 #: A page draws at most so many samples for each second of motion, Hz, besides those that it must not miss.
 FPS = 60.0

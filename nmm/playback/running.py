@@ -21,6 +21,12 @@ from nmm.control.step.recorded import Recorded
 from nmm.model.robots.frame_path import FramePath
 from nmm.model.robots.motion import Camera
 from nmm.model.robots.surroundings import NO_SURROUNDINGS, Surroundings
+from nmm.motion.components import Axes
+from nmm.motion.joining import row_names
+from nmm.motion.recording import Recorder
+from nmm.motion.seen import SeenPoints
+from nmm.motion.shown_frame import shown_frame
+from nmm.motion.trajectory import Trajectory
 from nmm.playback.cameras import live_numbers
 from nmm.playback.channels import live_channels, partition_text
 from nmm.playback.drawing import Drawing, encode, packed
@@ -28,12 +34,6 @@ from nmm.playback.rolling import RolledRobot
 from nmm.playback.scene import playback_scene
 from nmm.playback.server import Visitor
 from nmm.playback.session import RobotSession, Watching, counted
-from nmm.runs.components import Axes
-from nmm.runs.joining import row_names
-from nmm.runs.recording import Recorder
-from nmm.runs.seen import SeenPoints
-from nmm.runs.shown_frame import shown_frame
-from nmm.runs.trajectory import Trajectory
 
 #: Samples per second of a page's curves at most, besides those of its pictures, Hz.
 KEPT = 60.0

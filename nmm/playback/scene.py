@@ -16,6 +16,7 @@ from nmm.model.collisions.obstacle import Obstacle, obstacle_places
 from nmm.model.robots.motion import Motion
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.surroundings import Body
+from nmm.motion.trajectory import Trajectory
 from nmm.playback import extent
 from nmm.playback.cameras import draw_cameras, seen_points, tell_cameras
 from nmm.playback.channels import channels, draw_curves, draw_facts
@@ -34,7 +35,6 @@ from nmm.playback.obstacles import SceneObstacles, draw_nearest
 from nmm.playback.placements import base_position
 from nmm.playback.rolling import wheel_angles
 from nmm.playback.shapes import CARRIED, Y_TO_Z, DrawnRobot, cylinder, sphere
-from nmm.runs.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from nmm.playback.ellipsoids import SceneEllipsoids

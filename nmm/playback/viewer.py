@@ -18,6 +18,7 @@ from nmm.control.functions.tasks.task import Stack, Task
 from nmm.model.robots.motion import Motion
 from nmm.model.robots.reach import first_tip, tips
 from nmm.model.robots.robot import Robot
+from nmm.motion.shown_frame import shown_frame
 from nmm.playback.drawing import Command, Drawing, segment
 from nmm.playback.extent import robot_boxes
 from nmm.playback.html import HEIGHT, file_page, framed
@@ -26,7 +27,6 @@ from nmm.playback.rolling import Rolling
 from nmm.playback.scene import draw_beside, live_scene, points_beside, still
 from nmm.playback.session import Session
 from nmm.playback.shapes import DrawnRobot
-from nmm.runs.shown_frame import shown_frame
 
 if TYPE_CHECKING:
     from nmm.playback.viewed_task import ViewedTask

@@ -21,15 +21,15 @@ from nmm.base.findings.run import line
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.integrators import Integrator, integrator
+from nmm.motion.clearance import guarded
+from nmm.motion.closed_loop import drive_loop
+from nmm.motion.disturbances import Disturbances, Plant
+from nmm.motion.disturbed import check_disturbed, drive_disturbed
+from nmm.motion.recorded_run import sample_times
+from nmm.motion.recording import Recorder
+from nmm.motion.simulation import MOST_SAMPLES
+from nmm.motion.verdict import Outcome
 from nmm.rollouts.kept import MEASURES, Kept, measure
-from nmm.runs.clearance import guarded
-from nmm.runs.closed_loop import drive_loop
-from nmm.runs.disturbances import Disturbances, Plant
-from nmm.runs.disturbed import check_disturbed, drive_disturbed
-from nmm.runs.recorded_run import sample_times
-from nmm.runs.recording import Recorder
-from nmm.runs.simulation import MOST_SAMPLES
-from nmm.runs.verdict import Outcome
 from nmm.scenario import Scenario
 
 #: Where runs start: (B, n), (n,), or by name.

@@ -14,11 +14,11 @@ from nmm.base.findings import Finding
 from nmm.control.step.quantities import saved
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
+from nmm.motion.trajectory import Trajectory
+from nmm.motion.verdict import Verdict
 from nmm.ros.recorded import Names, Recorded
 from nmm.ros.routes import Route, routes
 from nmm.ros.tracks import by_differences, contradict, settle
-from nmm.runs.trajectory import Trajectory
-from nmm.runs.verdict import Verdict
 
 #: More samples are no bag that one looks at.
 MOST = 2_000_000

@@ -10,7 +10,7 @@ import numpy as np
 from nmm.base.arrays import Array, interpolated
 from nmm.base.errors import InputError
 from nmm.model.robots.configuration import Configuration
-from nmm.runs.trajectory import Trajectory
+from nmm.motion.trajectory import Trajectory
 
 
 def difference(run: Trajectory, bag: Trajectory) -> Mapping[str, Any]:

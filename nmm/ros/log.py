@@ -21,7 +21,7 @@ from nmm.ros.links import Links
 from nmm.ros.making import Messages
 
 if TYPE_CHECKING:
-    from nmm.runs.trajectory import Trajectory
+    from nmm.motion.trajectory import Trajectory
 
 JOINTS, INPUTS, ODOMETRY, TWIST, ERROR = "/joint_states", "/inputs", "/odom", "/cmd_vel", "/error"
 TF, TF_STATIC, EVENTS, DESCRIPTION = "/tf", "/tf_static", "/rosout", "/robot_description"

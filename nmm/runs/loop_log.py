@@ -14,9 +14,9 @@ from nmm.base.findings import Finding
 from nmm.base.kernels.compiled import checked_by_caller
 from nmm.control.controller import Controller
 from nmm.control.step.recorded import NOTE_SAMPLE, Recorded, note_sample, room
-from nmm.runs.recording import Recorder
-from nmm.runs.trajectory import Trajectory
-from nmm.runs.verdict import Verdict
+from nmm.motion.recording import Recorder
+from nmm.motion.trajectory import Trajectory
+from nmm.motion.verdict import Verdict
 
 #: So many findings are kept, the last ones.
 FINDINGS = 200

@@ -13,6 +13,7 @@ from nmm.base.arrays import Array, positive, scalar
 from nmm.base.errors import InputError
 from nmm.base.findings import Finding
 from nmm.control.controller import Controller
+from nmm.motion.trajectory import Trajectory
 from nmm.runs.loop_clock import LoopClock
 from nmm.runs.loop_inputs import LoopInputs
 from nmm.runs.loop_log import LoopFindings, LoopLog
@@ -20,7 +21,6 @@ from nmm.runs.loop_state import LoopState
 from nmm.runs.loop_watch import LoopWatch
 from nmm.runs.measured_state import MeasuredState, Tolerances
 from nmm.runs.pace import keep_pace
-from nmm.runs.trajectory import Trajectory
 
 _STOPS = LoopState.STOPPING, LoopState.STOPPED
 

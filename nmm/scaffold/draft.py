@@ -16,7 +16,7 @@ from nmm.base.text_format import one_line
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading.ground import slip_warnings
 from nmm.model.robots.robot import Robot
-from nmm.runs.trajectory import Outcome, Trajectory
+from nmm.motion.trajectory import Outcome, Trajectory
 from nmm.scaffold.end_effector import Hand, HandsPath, hands, paths
 from nmm.scaffold.parts import Chosen, chosen_robot
 from nmm.scaffold.standing import Standing, tipping

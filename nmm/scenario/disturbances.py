@@ -1,7 +1,7 @@
 """The disturbances of a scenario."""
 
 from nmm.model.robots.robot import Robot
-from nmm.runs.disturbances import Disturbances
+from nmm.motion.disturbances import Disturbances
 from nmm.scenario.constructors import MadePart, keys_of
 from nmm.scenario.numbers import NumbersByName
 

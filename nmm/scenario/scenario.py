@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from nmm.control.resolvers.base import Resolver
     from nmm.model.collisions.obstacle import Obstacle
     from nmm.model.robots.robot import Robot
-    from nmm.runs.recording import Recorder
-    from nmm.runs.trajectory import Trajectory
+    from nmm.motion.recording import Recorder
+    from nmm.motion.trajectory import Trajectory
     from nmm.scenario.sections import Motion
 
 SUFFIXES = (".yaml", ".yml")
@@ -158,7 +158,7 @@ class Scenario:
         ------
         ScenarioError : what the robot does not have, or what does not fit together
         """
-        from nmm.diagnosis.compile_ahead import compile_a_run_in_parallel
+        from nmm.motion.diagnosis.compile_ahead import compile_a_run_in_parallel
 
         compile_a_run_in_parallel()  # most who have a controller made run it
         robot = self.robot()
@@ -215,7 +215,7 @@ class Scenario:
             not given
         watch : as `simulate` takes it
         """
-        from nmm.runs.simulation import simulate
+        from nmm.motion.simulation import simulate
 
         parts = self.parts
         if parts.moved_by:

@@ -19,7 +19,7 @@ from nmm.model.robots.robot import Robot
 from nmm.scenario.keys import KeyedError, Part
 
 if TYPE_CHECKING:
-    from nmm.runs.trajectory import Trajectory
+    from nmm.motion.trajectory import Trajectory
 
 
 class Motion(Protocol):

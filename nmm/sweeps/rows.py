@@ -23,13 +23,13 @@ from nmm import __version__
 from nmm.base.errors import InputError, RunError
 from nmm.base.progress import Progress
 from nmm.control.step.quantities import placed
-from nmm.diagnosis.summary import RUN_NUMBERS
+from nmm.motion.diagnosis.summary import RUN_NUMBERS
 from nmm.scenario import Scenario
 from nmm.sweeps.definition import Definition, Listed
 
 if TYPE_CHECKING:
     from nmm.control.controller import Controller
-    from nmm.runs.trajectory import Trajectory
+    from nmm.motion.trajectory import Trajectory
 
 #: ‖e‖ has settled where it stays below this share of its initial value.
 SETTLED = 0.02

@@ -11,12 +11,12 @@ import numpy as np
 from nmm.base.errors import expect
 from nmm.base.latex import escaped
 from nmm.control.step.quantities import named_numbers
-from nmm.diagnosis.summary import RUN_NUMBERS
+from nmm.motion.diagnosis.summary import RUN_NUMBERS
 from nmm.tables.table import Quantity, Table, Value
 
 if TYPE_CHECKING:
     from nmm.analysis.redundancy.laps import Repeatability
-    from nmm.runs.trajectory import Trajectory
+    from nmm.motion.trajectory import Trajectory
 
 #: Those of the summary's numbers that come first, in this order.
 _FIRST = (

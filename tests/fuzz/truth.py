@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 
-from nmm.runs.trajectory import Outcome, Trajectory
+from nmm.motion.trajectory import Outcome, Trajectory
 
 from .hunting import LONGEST_LINE
 

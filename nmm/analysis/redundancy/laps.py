@@ -28,8 +28,8 @@ from nmm.control.functions.program import evaluate
 from nmm.control.functions.references import Bearing, Circle, PiecewisePolynomial, PoseReference
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
-from nmm.runs.simulation import simulate
-from nmm.runs.trajectory import Outcome, Trajectory
+from nmm.motion.simulation import simulate
+from nmm.motion.trajectory import Outcome, Trajectory
 
 if TYPE_CHECKING:
     from nmm.scenario import Scenario

@@ -41,12 +41,12 @@ from nmm.control.resolvers.answer import Status
 from nmm.control.resolvers.projected_gradient import ProjectedGradient
 from nmm.control.step.equations import ControlStep
 from nmm.control.step.step import Step
-from nmm.diagnosis.diagnose import lines, noticed
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
-from nmm.runs.recording import Recorder
-from nmm.runs.trajectory import Trajectory
-from nmm.runs.verdict import Outcome, Verdict
+from nmm.motion.diagnosis.diagnose import lines, noticed
+from nmm.motion.recording import Recorder
+from nmm.motion.trajectory import Trajectory
+from nmm.motion.verdict import Outcome, Verdict
 
 #: How fast the task is brought back from the integrator's drift, 1/s.
 GAIN = 10.0

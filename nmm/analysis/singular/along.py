@@ -23,7 +23,7 @@ from nmm.analysis.singular.parts import WHOLE, condition_numbers, groups, ranks,
 from nmm.analysis.singular.singularity import TOLERANCE
 from nmm.base.arrays import Array, Integers, interpolated, positive
 from nmm.base.errors import InputError, expect
-from nmm.runs.trajectory import Trajectory
+from nmm.motion.trajectory import Trajectory
 
 #: Two minima count as one unless the value rises between them by this fraction of the threshold.
 RISE = 1e-3

@@ -43,7 +43,7 @@ class Record:
 @dataclass(frozen=True)
 class Number:
     """A number in a run's summary. What the samples of one quantity determine stands with that quantity; what
-    several quantities, names or events determine together, in `nmm.diagnosis.summary.RUN_NUMBERS`.
+    several quantities, names or events determine together, in `nmm.motion.diagnosis.summary.RUN_NUMBERS`.
 
     key : in summary.json
     of : computes it from the times (N,) and the values (N, ...), or from the run; None for no number

@@ -15,16 +15,16 @@ import numpy as np
 from nmm.base.findings import Finding
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
-from nmm.diagnosis import reasons
-from nmm.diagnosis.assessment import Assessment, Instability, assess
-from nmm.diagnosis.error_bound import Departure, Samples
-from nmm.diagnosis.jumps import chattering, crossings, moving_otherwise
 from nmm.model.robots.wheel_slip import sideways_speeds
-from nmm.runs.leg import Leg
-from nmm.runs.recorded_run import record_run, sample_times
-from nmm.runs.recording import Recorder
-from nmm.runs.residuals import residuals, run_up
-from nmm.runs.verdict import FindingLine, Outcome, Verdict
+from nmm.motion.diagnosis import reasons
+from nmm.motion.diagnosis.assessment import Assessment, Instability, assess
+from nmm.motion.diagnosis.error_bound import Departure, Samples
+from nmm.motion.diagnosis.jumps import chattering, crossings, moving_otherwise
+from nmm.motion.leg import Leg
+from nmm.motion.recorded_run import record_run, sample_times
+from nmm.motion.recording import Recorder
+from nmm.motion.residuals import residuals, run_up
+from nmm.motion.verdict import FindingLine, Outcome, Verdict
 
 #: A finding that no shorter dt helps against.
 HOPELESS = "out_of_reach"

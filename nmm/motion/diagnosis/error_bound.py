@@ -24,8 +24,8 @@ from numba import types
 from nmm.base.arrays import Array, Flags, Integers
 from nmm.base.kernels.compiled import compiled, kernel, view
 from nmm.control.step.task_rows import gain_rows
-from nmm.runs.recording import Recorder
-from nmm.runs.residuals import differs
+from nmm.motion.recording import Recorder
+from nmm.motion.residuals import differs
 
 #: Factor on the local error, which is estimated, not bounded.
 SAFETY = 3.0

@@ -20,8 +20,16 @@ from nmm.control.resolvers.answer import SINGULAR_J
 from nmm.control.resolvers.base import State
 from nmm.control.resolvers.partitions import HELD, MODE, PartitionState
 from nmm.control.step.equations import ControlStep, call_step
-from nmm.diagnosis.error_bound import ENDS, Departure, Samples, adaptive_errors, decay, departure, step_errors
-from nmm.runs.recording import Recorder
+from nmm.motion.diagnosis.error_bound import (
+    ENDS,
+    Departure,
+    Samples,
+    adaptive_errors,
+    decay,
+    departure,
+    step_errors,
+)
+from nmm.motion.recording import Recorder
 
 #: Number of instants at which the integrator's stability is examined.
 EXAMINED = 20

@@ -17,11 +17,11 @@ from nmm.control.standing_pose import standing_pose
 from nmm.control.step.idle_inputs import idle_inputs
 from nmm.model.robots.loading.ground import slip_warnings
 from nmm.model.robots.loading.provenance import provenance_of
-from nmm.runs.clearance import guarded
-from nmm.runs.closed_loop import drive_loop
-from nmm.runs.leg import Ended, Leaving
-from nmm.runs.recording import Recorder
-from nmm.runs.verdict import FindingLine, Outcome
+from nmm.motion.clearance import guarded
+from nmm.motion.closed_loop import drive_loop
+from nmm.motion.leg import Ended, Leaving
+from nmm.motion.recording import Recorder
+from nmm.motion.verdict import FindingLine, Outcome
 
 #: Records a run over the times (N,) from q (n,), with progress and goal; returns how it ended.
 Drive: TypeAlias = Callable[

@@ -20,12 +20,12 @@ from nmm.control.step.quantities import Record, saved
 from nmm.control.step.recorded import NOTE_HELD, Recorded, note_held, room
 from nmm.control.step.safety_filter import Counts
 from nmm.control.step.step import Step
-from nmm.runs.clearance import Swept, swept
-from nmm.runs.margins import margin, shares, standing
-from nmm.runs.residuals import residuals
-from nmm.runs.seen import SeenPoints
-from nmm.runs.shown_frame import shown_frame
-from nmm.runs.trajectory import Trajectory
+from nmm.motion.clearance import Swept, swept
+from nmm.motion.margins import margin, shares, standing
+from nmm.motion.residuals import residuals
+from nmm.motion.seen import SeenPoints
+from nmm.motion.shown_frame import shown_frame
+from nmm.motion.trajectory import Trajectory
 
 #: Memory of a run, in sizes of its record: copies and derived arrays.
 COPIES = 2.5

@@ -23,10 +23,10 @@ from nmm.model.collisions.obstacle import Obstacle, obstacle_places
 from nmm.model.robots.motion import Motion, Nearest
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.surroundings import NO_SURROUNDINGS, Body, Surroundings
-from nmm.runs.residuals import NO_RESIDUALS, Residuals
-from nmm.runs.seen import RunCamera
-from nmm.runs.verdict import AS_ASKED, Awaited, Verdict
-from nmm.runs.verdict import Outcome as Outcome
+from nmm.motion.residuals import NO_RESIDUALS, Residuals
+from nmm.motion.seen import RunCamera
+from nmm.motion.verdict import AS_ASKED, Awaited, Verdict
+from nmm.motion.verdict import Outcome as Outcome
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,7 +54,7 @@ class Trajectory:
         nothing was relaxed on purpose
     step_size (N,): the share of α that was taken, 1 where it is constant
     crossed (N,): 1 where the extended Jacobian was singular on the way from the sample before, else 0
-    margin (N,): least distance to a limit, as a share of its range (see `nmm.runs.margins`), of all but the
+    margin (N,): least distance to a limit, as a share of its range (see `nmm.motion.margins`), of all but the
         coordinates that stand still throughout; below 0 where one is broken, infinite without limits
     shares (N, limited): where each of `limit_names` is between its limits, 0 at the lower, 1 at the upper one
     limited : whether the controller kept limits
@@ -82,7 +82,7 @@ class Trajectory:
     scenario : the scenario as resolved, if it came from one
     events : when tasks that come and go began and ended, and why
     label : what it is called among other runs; "" for its resolver
-    made_with : the versions and the machine that computed it (`nmm.base.machine`); empty where a folder lacks them
+    made_with : the versions and the machine that computed it (`nmm.base.machine`); empty where not saved
     more : further recorded quantities by name; `trajectory[name]` is any of them
 
     Examples
@@ -152,7 +152,7 @@ class Trajectory:
         return cls(**own, **rest, more={name: arrays[name] for name in arrays if name not in own})
 
     def __getitem__(self, name: str) -> Array:
-        """A recorded quantity by its name (`nmm.control.step.quantities`); `InputError` for what is none of it."""
+        """A recorded quantity by its name (`nmm.control.step.quantities`); else `InputError`."""
         expect_known("quantity", name, [one.name for one in QUANTITIES.values() if one.saved or one.of])
         one, known = QUANTITIES[name], {**vars(self), **self.more}
         if name in known:
@@ -257,7 +257,7 @@ class Trajectory:
     def summary(self, motors: bool = True) -> dict[str, Any]:
         """The run in numbers, ready for JSON; `motors`: also motors over their limits, and a robot that tips,
         as findings of the line "motors"."""
-        return lazy_call("nmm.diagnosis.summary:summarise")(self, motors)
+        return lazy_call("nmm.motion.diagnosis.summary:summarise")(self, motors)
 
     def save(
         self, folder: str | Path, *, figures: Drawn = True, html: bool = False, ellipsoids: Wanted = False

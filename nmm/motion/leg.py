@@ -9,8 +9,8 @@ from nmm.base.arrays import Array
 from nmm.control.controller import Controller
 from nmm.control.integrators import Integrator
 from nmm.control.sequencing.sequence import Schedule
-from nmm.runs.recording import Recorder
-from nmm.runs.verdict import FindingLine, Outcome
+from nmm.motion.recording import Recorder
+from nmm.motion.verdict import FindingLine, Outcome
 
 
 class Ended(NamedTuple):

@@ -12,12 +12,12 @@ from nmm.control.controller import Controller
 from nmm.control.sequencing.sequence import Schedule
 from nmm.control.step.quantities import QUANTITIES, saved
 from nmm.model.robots.robot import Robot
-from nmm.runs.clearance import Swept, swept
-from nmm.runs.leg import Leg
-from nmm.runs.residuals import NO_RESIDUALS, Residuals
-from nmm.runs.seen import SeenPoints
-from nmm.runs.shown_frame import shown_frame
-from nmm.runs.trajectory import Trajectory
+from nmm.motion.clearance import Swept, swept
+from nmm.motion.leg import Leg
+from nmm.motion.residuals import NO_RESIDUALS, Residuals
+from nmm.motion.seen import SeenPoints
+from nmm.motion.shown_frame import shown_frame
+from nmm.motion.trajectory import Trajectory
 
 
 def join(

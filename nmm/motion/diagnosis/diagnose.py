@@ -11,14 +11,21 @@ from nmm.control.controller import Controller
 from nmm.control.functions.function import row_scales
 from nmm.control.goal import Goal, error_sizes
 from nmm.control.sequencing.sequence import Schedule
-from nmm.diagnosis.judgement import Judged, judge
-from nmm.diagnosis.limits import binding, broken_limits, broken_rows, distances_short, not_kept, ran_into
-from nmm.diagnosis.reasons import near_singularity
-from nmm.runs.clearance import Swept
-from nmm.runs.leg import Leg
-from nmm.runs.recording import Recorder
-from nmm.runs.trajectory import Trajectory
-from nmm.runs.verdict import Awaited, FindingLine, Outcome, Verdict
+from nmm.motion.clearance import Swept
+from nmm.motion.diagnosis.judgement import Judged, judge
+from nmm.motion.diagnosis.limits import (
+    binding,
+    broken_limits,
+    broken_rows,
+    distances_short,
+    not_kept,
+    ran_into,
+)
+from nmm.motion.diagnosis.reasons import near_singularity
+from nmm.motion.leg import Leg
+from nmm.motion.recording import Recorder
+from nmm.motion.trajectory import Trajectory
+from nmm.motion.verdict import Awaited, FindingLine, Outcome, Verdict
 
 #: Below this ratio of smallest to largest singular value a run is warned about.
 NEARLY_SINGULAR = 1e-3

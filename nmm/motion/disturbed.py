@@ -22,11 +22,11 @@ from nmm.control.resolvers.partitions import PartitionState
 from nmm.control.step.equations import ControlStep, write_equation
 from nmm.control.step.recorded import Recorded, note_sample
 from nmm.control.step.stepping import hold_inputs
-from nmm.runs.closed_loop import drive_loop, finding_in
-from nmm.runs.compiled_loop import DIVERGED_BEYOND, compiled_sample, within_bound
-from nmm.runs.disturbances import Disturbed, Plant
-from nmm.runs.recording import Recorder
-from nmm.runs.verdict import FindingLine, Outcome
+from nmm.motion.closed_loop import drive_loop, finding_in
+from nmm.motion.compiled_loop import DIVERGED_BEYOND, compiled_sample, within_bound
+from nmm.motion.disturbances import Disturbed, Plant
+from nmm.motion.recording import Recorder
+from nmm.motion.verdict import FindingLine, Outcome
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from nmm.control.controller import Controller
 from nmm.control.directions import WORLD_PARTS, in_world_axes, lost_directions, weakest_direction
 from nmm.control.functions.function import Row, row_scales
 from nmm.control.resolvers.damped_least_squares import DampedLeastSquares
-from nmm.diagnosis.error_bound import Departure, Samples
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.reach import Reach, joint_position, reach
+from nmm.motion.diagnosis.error_bound import Departure, Samples
 
 #: Below this ratio of smallest to largest singular value of the scaled J a departure is put down to it.
 SINGULAR = 0.02

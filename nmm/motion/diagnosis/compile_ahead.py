@@ -4,10 +4,10 @@ from nmm.base.kernels.parallel_compile import compile_in_parallel
 from nmm.base.kernels.spectra import WRITE_SPECTRA, write_spectra
 from nmm.control.functions.program import PLACE, place
 from nmm.control.step.equations import step
-from nmm.diagnosis.assessment import LINEARISE, linearise
-from nmm.diagnosis.error_bound import write_step_errors
 from nmm.model.robots.frame_path import follow_frame
-from nmm.runs.compiled_loop import ADVANCE_SAMPLES, advance_samples
+from nmm.motion.compiled_loop import ADVANCE_SAMPLES, advance_samples
+from nmm.motion.diagnosis.assessment import LINEARISE, linearise
+from nmm.motion.diagnosis.error_bound import write_step_errors
 
 
 def compile_a_run_in_parallel() -> None:

@@ -15,7 +15,7 @@ from nmm.control.step.quantities import placed
 
 if TYPE_CHECKING:
     from nmm.control.controller import Controller
-    from nmm.runs.trajectory import Trajectory
+    from nmm.motion.trajectory import Trajectory
 
 STEPS = 500
 

@@ -17,10 +17,10 @@ from nmm.control.goal import Goal
 from nmm.control.integrators import Integrator
 from nmm.control.step.sample import Snapshot
 from nmm.control.step.step import Step
-from nmm.runs.compiled_loop import DIVERGED_BEYOND, CompiledLoop, compiled_loop
-from nmm.runs.leg import Leaving
-from nmm.runs.recording import Recorder
-from nmm.runs.verdict import FindingLine, Outcome
+from nmm.motion.compiled_loop import DIVERGED_BEYOND, CompiledLoop, compiled_loop
+from nmm.motion.leg import Leaving
+from nmm.motion.recording import Recorder
+from nmm.motion.verdict import FindingLine, Outcome
 
 
 def drive_loop(

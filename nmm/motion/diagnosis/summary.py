@@ -10,14 +10,14 @@ import numpy as np
 from nmm.base.findings import Finding
 from nmm.base.findings.run import MOTORS
 from nmm.control.step.quantities import Number, placed
-from nmm.diagnosis.limits import fast_wheels
-from nmm.diagnosis.motors import motor_findings
 from nmm.model.collisions.obstacle import obstacle_as_json
 from nmm.model.robots.wheel_rates import inputs_held_by
-from nmm.runs.margins import at_limits, nearest_limits
+from nmm.motion.diagnosis.limits import fast_wheels
+from nmm.motion.diagnosis.motors import motor_findings
+from nmm.motion.margins import at_limits, nearest_limits
 
 if TYPE_CHECKING:
-    from nmm.runs.trajectory import Trajectory
+    from nmm.motion.trajectory import Trajectory
 
 FORMAT = "nmm run 1"
 #: The settling band, as a share of the initial error.

@@ -7,7 +7,7 @@ import numpy as np
 
 from nmm.base.arrays import Array, Flags, Integers
 from nmm.base.findings import Finding
-from nmm.runs.recording import crossed
+from nmm.motion.recording import crossed
 
 #: So many jumps in a row, each back from the last: fewer are a switch of partition, or a swing.
 IN_A_ROW = 4

@@ -12,7 +12,7 @@ from nmm.base.findings import Finding
 
 if TYPE_CHECKING:
     from nmm.model.dynamics.torques import Torques
-    from nmm.runs.trajectory import Trajectory
+    from nmm.motion.trajectory import Trajectory
 
 #: Longer runs take seconds: of these `nmm torques` tells when asked.
 MOST_SAMPLES = 50_000

@@ -17,15 +17,15 @@ from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.integrators import STEPPING, Integrator, integrator
 from nmm.control.sequencing.sequence import Schedule
-from nmm.runs.closed_loop import finding_in
-from nmm.runs.disturbances import Disturbances, Disturbed
-from nmm.runs.disturbed import check_disturbed, drive_disturbed
-from nmm.runs.joining import join
-from nmm.runs.leg import Leaving, Leg
-from nmm.runs.recorded_run import Drive, record_run, sample_times
-from nmm.runs.recording import Recorder
-from nmm.runs.trajectory import Trajectory
-from nmm.runs.verdict import FindingLine, Outcome
+from nmm.motion.closed_loop import finding_in
+from nmm.motion.disturbances import Disturbances, Disturbed
+from nmm.motion.disturbed import check_disturbed, drive_disturbed
+from nmm.motion.joining import join
+from nmm.motion.leg import Leaving, Leg
+from nmm.motion.recorded_run import Drive, record_run, sample_times
+from nmm.motion.recording import Recorder
+from nmm.motion.trajectory import Trajectory
+from nmm.motion.verdict import FindingLine, Outcome
 
 #: The most samples that a run may have; beyond it the numbers do not fit in memory.
 MOST_SAMPLES = 20_000_000
@@ -131,14 +131,14 @@ def simulate(
     if schedule is not None:
         legs = _legs(controller, schedule, advance, times, q, progress, until, watch)
         run, found = join(controller, schedule, legs, dt, method)
-        verdict = lazy_call("nmm.diagnosis.diagnose:diagnose_legs")(
+        verdict = lazy_call("nmm.motion.diagnosis.diagnose:diagnose_legs")(
             controller, schedule, legs, run, found, until
         )
     else:
         recorder, ended = record_run(controller, advance, times, q, progress, until, None, watch, drive)
         run = recorder.trajectory(dt, method)
         leg = Leg(controller, (), advance, recorder, ended, duration)
-        verdict = lazy_call("nmm.diagnosis.diagnose:diagnose")(leg, run, until)
+        verdict = lazy_call("nmm.motion.diagnosis.diagnose:diagnose")(leg, run, until)
     return replace(run, verdict=verdict)
 
 

@@ -14,10 +14,10 @@ from nmm.control.step.safety_filter import Counts
 from nmm.model.collisions.scene import Scene
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.wheel_rates import turning_wheels
-from nmm.runs.clearance import ROUNDING, Swept
-from nmm.runs.margins import standing
-from nmm.runs.recording import Recorder
-from nmm.runs.trajectory import Trajectory
+from nmm.motion.clearance import ROUNDING, Swept
+from nmm.motion.margins import standing
+from nmm.motion.recording import Recorder
+from nmm.motion.trajectory import Trajectory
 
 #: Exceeding a limit by less than this part of it is rounding.
 SLACK = 1e-6

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from nmm.base.arrays import Array
 from nmm.control.step.quantities import RecordedQuantity
 from nmm.model.robots.robot import Robot
-from nmm.runs.trajectory import Trajectory
+from nmm.motion.trajectory import Trajectory
 
 
 class Component(NamedTuple):

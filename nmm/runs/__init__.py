@@ -1,1 +1,0 @@
-"""The loop closed: integrated, judged and recorded."""
