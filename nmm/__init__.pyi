@@ -130,8 +130,8 @@ from .rollouts.rollout import rollout as rollout
 from .ros.bag import read_bag as read_bag
 from .runs.loop_state import LoopState as LoopState
 from .runs.robot_loop import Loop as Loop
-from .scaffold import first_scenario as first_scenario
 from .scenario import Scenario as Scenario
+from .scenario.scaffold import first_scenario as first_scenario
 from .sweeps import Sweep as Sweep
 from .tables import comparison_table as comparison_table
 from .tables import laps_table as laps_table

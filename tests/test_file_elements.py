@@ -20,7 +20,7 @@ from nmm.model.robots.loading.file_elements import READ, SRDF, URDF
 from nmm.model.robots.loading.packages import package_file
 from nmm.model.robots.loading.provenance import accelerations_of
 from nmm.model.robots.loading.report import file_report
-from nmm.scaffold import first_scenario
+from nmm.scenario.scaffold import first_scenario
 
 UNREAD = ("element_unknown", "attribute_unknown", "element_unread", "attribute_unread", "element_again")
 

@@ -24,7 +24,7 @@ from nmm.cli.subjects import configuration_at
 from nmm.folders import run as folders_run
 from nmm.model.robots.reach import first_tip, tips
 from nmm.playback.channels import channels
-from nmm.scaffold.end_effector import hands
+from nmm.scenario.scaffold.end_effector import hands
 from nmm.scenario.short_task import short_task
 
 POSTURE = "objective: {kind: posture, posture: {lift: 0.6, left_finger_joint: 0.01}}"

@@ -21,7 +21,7 @@ from nmm.figures.style import figure, save
 from nmm.folders.run import is_run
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading.packages import package_file
-from nmm.scaffold.end_effector import hands
+from nmm.scenario.scaffold.end_effector import hands
 
 DATA = "package://example-robot-data/robots/"
 Command = Callable[..., Result]

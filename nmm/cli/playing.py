@@ -170,7 +170,7 @@ def _with_arm(
 ) -> tuple[list[str], Robot]:
     """The coordinates of `--at`, and the robot; an `--at` without = names the frame that carries the arm."""
     from nmm.cli.subjects import is_scenario
-    from nmm.scaffold.parts import chosen_robot
+    from nmm.scenario.scaffold.parts import chosen_robot
 
     if is_scenario(source):
         what = f"{source} is a scenario, which has one"

@@ -166,8 +166,8 @@ def init(
     nmm init my_arm.urdf --platform fixed
     """
     from nmm.model.robots.loading.source import source_path
-    from nmm.scaffold import first_scenario
-    from nmm.scaffold.draft import usual_file
+    from nmm.scenario.scaffold import first_scenario
+    from nmm.scenario.scaffold.draft import usual_file
 
     given = loading.keywords()
     for source in (robot, arm):

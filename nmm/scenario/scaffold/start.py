@@ -13,8 +13,8 @@ from nmm.model.collisions.pairs import HULLS, measured_pairs, query_shapes, rand
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.semantics import POSTURE
-from nmm.scaffold.end_effector import Hand, movable
-from nmm.scaffold.standing import Standing
+from nmm.scenario.scaffold.end_effector import Hand, movable
+from nmm.scenario.scaffold.standing import Standing
 from nmm.scenario.short_task import moving_axes
 
 #: A J whose least singular value is below this, per metre of arm, is near a singularity.

@@ -17,13 +17,13 @@ from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading.ground import slip_warnings
 from nmm.model.robots.robot import Robot
 from nmm.motion.trajectory import Outcome, Trajectory
-from nmm.scaffold.end_effector import Hand, HandsPath, hands, paths
-from nmm.scaffold.parts import Chosen, chosen_robot
-from nmm.scaffold.standing import Standing, tipping
-from nmm.scaffold.start import Start, start_for
-from nmm.scaffold.text import text_of
 from nmm.scenario import Scenario
 from nmm.scenario.document import document_of
+from nmm.scenario.scaffold.end_effector import Hand, HandsPath, hands, paths
+from nmm.scenario.scaffold.parts import Chosen, chosen_robot
+from nmm.scenario.scaffold.standing import Standing, tipping
+from nmm.scenario.scaffold.start import Start, start_for
+from nmm.scenario.scaffold.text import text_of
 
 #: At most this many scenarios are tried, for at most this many frames.
 _TRIES, _HANDS = 18, 3
