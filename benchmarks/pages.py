@@ -20,8 +20,8 @@ from machine import described
 from tables import Section, into, text
 
 import nmm
-from nmm.playback import write_html
 from nmm.rendering.chromium import HeadlessPage
+from nmm.views.playback import write_html
 
 SIZE, OPENED, FRAMES = (1280, 720), 5, 12
 FIRST_POSE = "performance.getEntriesByName('nmm first pose')"

@@ -24,9 +24,9 @@ from PIL import Image
 
 import nmm
 from nmm.base.errors import expect_known
-from nmm.figures import overview, save
-from nmm.playback import write_html
 from nmm.rendering.chromium import HeadlessPage
+from nmm.views.figures import overview, save
+from nmm.views.playback import write_html
 
 #: Of a picture, at most, px.
 WIDTH = 1248

@@ -1,9 +1,6 @@
 from . import analysis as analysis
 from . import driving as driving
 from . import extending as extending
-from . import figures as figures
-from . import folders as folders
-from . import playback as playback
 from . import rendering as rendering
 from . import ros as ros
 from .base.errors import DivergedError as DivergedError
@@ -133,7 +130,10 @@ from .runs.robot_loop import Loop as Loop
 from .scenario import Scenario as Scenario
 from .scenario.scaffold import first_scenario as first_scenario
 from .sweeps import Sweep as Sweep
-from .tables import comparison_table as comparison_table
-from .tables import laps_table as laps_table
+from .views import figures as figures
+from .views import folders as folders
+from .views import playback as playback
+from .views.tables import comparison_table as comparison_table
+from .views.tables import laps_table as laps_table
 
 __version__: str

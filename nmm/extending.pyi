@@ -219,5 +219,5 @@ from .scenario.numbers import Positive as Positive
 from .scenario.sections import Making as Making
 from .scenario.sections import Section as Section
 from .sweeps import SweepResult as SweepResult
-from .tables import Table as Table
-from .tables.table import Quantity as Quantity
+from .views.tables import Table as Table
+from .views.tables.table import Quantity as Quantity

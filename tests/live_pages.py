@@ -21,7 +21,7 @@ from tornado.websocket import WebSocketClientConnection, WebSocketClosedError, w
 
 import nmm
 from nmm.motion.trajectory import Trajectory
-from nmm.playback import LiveRun
+from nmm.views.playback import LiveRun
 
 #: The arrays of a page's commands.
 KINDS = {"f32": "<f4", "f64": "<f8", "u32": "<u4"}

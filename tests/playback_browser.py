@@ -17,9 +17,9 @@ from playback_robot import hand_built_robot
 from playwright.sync_api import Browser, Page, ViewportSize, sync_playwright
 
 from nmm.model.robots.robot import Robot
-from nmm.playback import Motion, write_html
-from nmm.playback.extent import corners, robot_boxes
-from nmm.playback.placements import Placements
+from nmm.views.playback import Motion, write_html
+from nmm.views.playback.extent import corners, robot_boxes
+from nmm.views.playback.placements import Placements
 
 #: three.js has y upwards: MeshCat turns the whole scene by this.
 UPRIGHT = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])

@@ -12,7 +12,7 @@ import trimesh
 from nmm.model.platforms import Unicycle
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.wheel import Wheel
-from nmm.playback import Motion
+from nmm.views.playback import Motion
 
 fcl = pin.hppfcl
 

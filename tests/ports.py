@@ -48,7 +48,7 @@ PLAYER = """
     from pathlib import Path
     sys.path.insert(0, {tests!r})
     from playback_robot import drive, hand_built_robot
-    from nmm.playback import play
+    from nmm.views.playback import play
     play([drive(hand_built_robot(Path({folder!r})), duration=1.0)], port={port}, open_browser=False)
     print("returned")
 """

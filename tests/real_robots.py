@@ -21,7 +21,7 @@ import numpy as np
 import pinocchio as pin
 
 import nmm
-from nmm.playback import wheel_rates
+from nmm.views.playback import wheel_rates
 
 #: Rates may differ by this share of the largest: radii and files have three digits.
 ALIKE = 1e-3

@@ -20,7 +20,7 @@ from short_scenario import MINIMAL
 
 import nmm
 from nmm.driving import ScenarioSetup, drive
-from nmm.playback import view, write_html
+from nmm.views.playback import view, write_html
 
 #: Each fault: how bad it is, which rule, and where.
 FAULTS = """axe.run().then(({ violations }) =>

@@ -16,8 +16,8 @@ import nmm
 from nmm.cli.exit_status import status_of
 from nmm.model.platforms import Car, FrontDriveCar
 from nmm.model.robots.robot import Robot
-from nmm.playback.placements import Placements
-from nmm.playback.rolling import Rolling
+from nmm.views.playback.placements import Placements
+from nmm.views.playback.rolling import Rolling
 
 Array = np.ndarray
 

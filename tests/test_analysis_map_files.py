@@ -15,11 +15,11 @@ from nmm.analysis.maps.singular_set import SingularSet
 from nmm.analysis.maps.workspace import workspace_map
 from nmm.base.errors import InputError
 from nmm.control.functions.tasks import Heading, Position
-from nmm.figures.maps import thinned
-from nmm.folders.map import is_map
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot
+from nmm.views.figures.maps import thinned
+from nmm.views.folders.map import is_map
 
 PLANAR = Position("ee", "xy")
 WITH_HEADING = (PLANAR, Heading("link2"))

@@ -145,7 +145,7 @@ def test_a_range_where_digits_are_lost(given: str, capsys: pytest.CaptureFixture
 def test_a_long_table_is_written_in_parts(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     run = nmm.Scenario.load("unicycle_2r_position", {"duration": 0.1}).run()
     whole = (run.save(tmp_path / "whole", figures=False) / "trajectory.csv").read_text()
-    monkeypatch.setattr("nmm.folders.run.ROWS", 7)
+    monkeypatch.setattr("nmm.views.folders.run.ROWS", 7)
     assert (run.save(tmp_path / "parts", figures=False) / "trajectory.csv").read_text() == whole
 
 

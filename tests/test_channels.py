@@ -13,10 +13,10 @@ from playback_robot import drive, hand_built_robot
 
 from nmm.base.errors import InputError
 from nmm.motion.trajectory import Trajectory
-from nmm.playback import write_html
-from nmm.playback.channels import FPS, SEEN, Channel, channels
-from nmm.playback.keyframes import MOST_FRAMES
 from nmm.scenario import Scenario
+from nmm.views.playback import write_html
+from nmm.views.playback.channels import FPS, SEEN, Channel, channels
+from nmm.views.playback.keyframes import MOST_FRAMES
 
 
 def found(trajectory: Trajectory) -> dict[str, Channel]:

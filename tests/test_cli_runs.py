@@ -27,7 +27,7 @@ from nmm.cli.exit_status import status_of
 from nmm.cli.options import chosen, named
 from nmm.cli.playing import runs_in
 from nmm.cli.runs import run as run_scenario
-from nmm.tables import Table
+from nmm.views.tables import Table
 
 SHORT = ("--set", "duration=0.5")
 Command = Callable[..., Result]

@@ -14,7 +14,7 @@ import nmm
 from nmm.motion import closed_loop
 from nmm.motion.diagnosis.jumps import crossings
 from nmm.motion.recording import crossed
-from nmm.playback.channels import channels, events
+from nmm.views.playback.channels import channels, events
 
 STOPPING = nmm.Scenario.load("unicycle_2r_algorithmic", {"resolver.singular": "stop"})
 

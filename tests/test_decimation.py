@@ -12,7 +12,7 @@ import trimesh
 
 import nmm
 from nmm.base.arrays import Array
-from nmm.playback.meshes import OFF, Indices, _light, decimated, mesh_pieces
+from nmm.views.playback.meshes import OFF, Indices, _light, decimated, mesh_pieces
 
 Mesh = tuple[Array, Indices]
 

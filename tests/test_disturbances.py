@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 import nmm
-from nmm.playback.channels import channels
 from nmm.sweeps.rows import rows_of
+from nmm.views.playback.channels import channels
 
 #: The paper's first case on worn wheels (its shares were measured in a physics engine, docs/sweeps.md).
 CASE = "unicycle_2r_position"

@@ -30,7 +30,7 @@ from nmm.driving.planning import Planning
 from nmm.driving.session import Aim, DriveSession, Order, Pick, parsed
 from nmm.driving.setups import DriveSetup, RobotSetup, ScenarioSetup, Settings
 from nmm.model.robots.configuration import Configuration
-from nmm.playback.rolling import Rolling
+from nmm.views.playback.rolling import Rolling
 
 KINDS = ("rg", "pg", "ej", "dls")
 

@@ -16,7 +16,7 @@ from nmm.cli.torques import torques
 from nmm.model.dynamics.support import Support, hull
 from nmm.model.dynamics.torques import accelerations, torques_along
 from nmm.motion.table import summary_rows
-from nmm.playback.channels import channels, events
+from nmm.views.playback.channels import channels, events
 
 UR5 = "package://example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
 G = 9.81

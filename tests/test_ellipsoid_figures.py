@@ -16,11 +16,11 @@ from nmm.analysis.singular.ellipsoids import drawn_ellipsoids, drawn_scale, elli
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError
 from nmm.cli.exit_status import status_of
-from nmm.figures.ellipses import ellipses
 from nmm.model.robots.motion import Motion
-from nmm.playback.ellipsoids import CLOSE, EllipsoidOptions, SceneEllipsoids, between_error
-from nmm.playback.extent import extent_of
-from nmm.playback.keyframes import Keyframes
+from nmm.views.figures.ellipses import ellipses
+from nmm.views.playback.ellipsoids import CLOSE, EllipsoidOptions, SceneEllipsoids, between_error
+from nmm.views.playback.extent import extent_of
+from nmm.views.playback.keyframes import Keyframes
 
 # What the page shows between its frames
 

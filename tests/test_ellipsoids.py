@@ -13,7 +13,7 @@ from nmm.analysis.singular.ellipsoids import Ellipsoids, carried_frame, ellipsoi
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError
 from nmm.model.robots.configuration import Configuration
-from nmm.playback.ellipsoids import EllipsoidOptions
+from nmm.views.playback.ellipsoids import EllipsoidOptions
 
 #: A planar robot, a spatial one, an arm on a fixed base, one on a car, one with more inputs than it needs.
 ROBOTS = ("unicycle_2r", "unicycle_3r", "small_arm", "car with arm", "omni with arm")

@@ -16,12 +16,12 @@ from nmm import figures
 from nmm.base.bundled import bundled_scenarios
 from nmm.base.errors import InputError
 from nmm.base.figure_options import WIDTHS, FigureOptions
-from nmm.figures.composed import write_run_figures
-from nmm.figures.motion import Scene
-from nmm.figures.silhouette import hull
-from nmm.figures.time_labels import Place
-from nmm.figures.views import ABOVE, SIDE, upright
 from nmm.scenario import Scenario
+from nmm.views.figures.composed import write_run_figures
+from nmm.views.figures.motion import Scene
+from nmm.views.figures.silhouette import hull
+from nmm.views.figures.time_labels import Place
+from nmm.views.figures.views import ABOVE, SIDE, upright
 
 ONE = "unicycle_2r_position"
 #: Pixels of text nearer to white than this are its own blur.

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from nmm.base import resolver_style
-from nmm.figures import style
-from nmm.figures.silhouette import Silhouette, hull
 from nmm.model.robots.robot import Robot
+from nmm.views.figures import style
+from nmm.views.figures.silhouette import Silhouette, hull
 
 
 def test_arm_is_drawn_where_the_robot_is(robot_2r: Robot, rng: np.random.Generator) -> None:

@@ -22,12 +22,12 @@ from nmm.base.errors import InputError
 from nmm.control.controller import Controller
 from nmm.control.functions.tasks import Heading, LinearCoordinates, Position, Task
 from nmm.control.resolvers import ProjectedGradient
-from nmm.figures import style
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot
 from nmm.motion.simulation import simulate
 from nmm.motion.trajectory import Trajectory
 from nmm.scenario import Scenario
+from nmm.views.figures import style
 
 #: Where the packages of example-robot-data are.
 SHARE = Path(sysconfig.get_paths()["purelib"]) / "cmeel.prefix" / "share"

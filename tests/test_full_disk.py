@@ -19,7 +19,7 @@ from test_killed_commands import CASES, content, files, hidden
 import nmm
 from nmm.base.files import UnwrittenError
 from nmm.model.robots.motion import Motion
-from nmm.playback import write_html
+from nmm.views.playback import write_html
 
 #: NMM_KILLS=30 fills the disk so often for each command.
 TIMES = max(2, int(os.environ.get("NMM_KILLS", "0")))

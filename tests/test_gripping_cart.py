@@ -21,11 +21,11 @@ from nmm.analysis.singular.ellipsoids import frame_of
 from nmm.base.files import whole_file
 from nmm.cli.exit_status import status_of
 from nmm.cli.subjects import configuration_at
-from nmm.folders import run as folders_run
 from nmm.model.robots.reach import first_tip, tips
-from nmm.playback.channels import channels
 from nmm.scenario.scaffold.end_effector import hands
 from nmm.scenario.short_task import short_task
+from nmm.views.folders import run as folders_run
+from nmm.views.playback.channels import channels
 
 POSTURE = "objective: {kind: posture, posture: {lift: 0.6, left_finger_joint: 0.01}}"
 

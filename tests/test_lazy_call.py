@@ -21,7 +21,9 @@ CALLED = sorted(
 
 
 def test_runs_and_maps_call_lazily() -> None:
-    assert {"nmm.folders.run:save", "nmm.folders.run:load", "nmm.folders.map:save"} <= set(CALLED)
+    assert {"nmm.views.folders.run:save", "nmm.views.folders.run:load", "nmm.views.folders.map:save"} <= set(
+        CALLED
+    )
 
 
 @pytest.mark.parametrize("name", CALLED)

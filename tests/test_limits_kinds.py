@@ -16,7 +16,7 @@ from gripping import FINGERS, panda
 import nmm
 from nmm.model.robots.robot import Robot
 from nmm.motion.margins import margin, shares
-from nmm.playback.rolling import Rolling
+from nmm.views.playback.rolling import Rolling
 
 Array = np.ndarray
 DT = 0.01

@@ -20,9 +20,9 @@ from ports import MOST, listening, wait_for
 import nmm
 from nmm.model.robots.configuration import Configuration
 from nmm.motion.trajectory import Trajectory
-from nmm.playback import LiveRun
 from nmm.playback.running import ALL, KEPT
 from nmm.playback.session import AHEAD, FPS, Watching, counted
+from nmm.views.playback import LiveRun
 
 DT = 0.005
 SHORT = ("--set", "duration=0.5")

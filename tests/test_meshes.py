@@ -125,7 +125,7 @@ def test_files_that_are_no_meshes_do_for_control(tmp_path: Path) -> None:
 
 
 def test_figures_read_the_platform_alone(read: list[str]) -> None:
-    from nmm.figures.silhouette import Silhouette
+    from nmm.views.figures.silhouette import Silhouette
 
     arm = nmm.load(UR5)
     Silhouette(arm, "tool0").at(arm.q())
@@ -133,7 +133,7 @@ def test_figures_read_the_platform_alone(read: list[str]) -> None:
 
 
 def test_bodies_without_visuals_read_their_collision_shapes_alone(read: list[str], tmp_path: Path) -> None:
-    from nmm.playback.sticks import appearance
+    from nmm.views.playback.sticks import appearance
 
     solids = {name: cube(tmp_path / f"{name}.stl") for name in "ab"}
     parts = [shape(f'<mesh filename="{file}"/>', "collision") for file in solids.values()]

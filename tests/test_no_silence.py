@@ -23,8 +23,8 @@ from nmm.cli.app import app
 from nmm.cli.exit_status import main, status_of
 from nmm.cli.output import readable, show_table, show_text
 from nmm.model.robots.motion import Motion
-from nmm.playback import write_html
 from nmm.rendering.encoder import expect_video
+from nmm.views.playback import write_html
 
 MOST = 120.0
 #: NMM_KILLS=30 interrupts so often.

@@ -18,7 +18,7 @@ from playback_robot import drive
 import nmm
 from nmm.base.errors import InputError
 from nmm.model.robots.robot import Robot
-from nmm.playback import Page
+from nmm.views.playback import Page
 
 
 @pytest.fixture(scope="module")

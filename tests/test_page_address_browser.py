@@ -11,9 +11,9 @@ from playwright.sync_api import Browser
 from ports import MOST
 
 from nmm.model.robots.robot import Robot
-from nmm.playback import LiveViewer
-from nmm.playback.html import socket_page
 from nmm.playback.server import PageServer
+from nmm.views.playback import LiveViewer
+from nmm.views.playback.html import socket_page
 
 
 def test_a_page_by_the_name_of_this_machine_is_told_all_the_same(

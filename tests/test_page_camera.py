@@ -20,8 +20,8 @@ from nmm.control.step.quantities import QUANTITIES
 from nmm.driving import ScenarioSetup, drive
 from nmm.driving.driven import Driven
 from nmm.driving.things import Things
-from nmm.playback import write_html
 from nmm.playback.running import Growing
+from nmm.views.playback import write_html
 
 PIXELS = [525.0, 500.0, 320.0, 240.0]
 

@@ -15,8 +15,8 @@ from playwright.sync_api import Page
 
 import nmm
 from nmm.motion.trajectory import Outcome, Trajectory
-from nmm.playback import write_html
-from nmm.playback.channels import MOST, channels, events
+from nmm.views.playback import write_html
+from nmm.views.playback.channels import MOST, channels, events
 
 
 def run(name: str, **settings: object) -> Trajectory:
@@ -79,7 +79,7 @@ def test_tasks_settling_and_the_end(switching: Trajectory) -> None:
 def test_a_page_holds_so_many_events_and_says_how_many_more(
     switching: Trajectory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("nmm.playback.channels.MOST", 1)
+    monkeypatch.setattr("nmm.views.playback.channels.MOST", 1)
     page = write_html([switching], tmp_path / "page.html").read_text(encoding="utf-8")
     line = next(line for line in page.splitlines() if line.startswith("{") and '"type":"facts"' in line)
     (one,) = json.loads(line)["runs"]

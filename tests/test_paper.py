@@ -20,13 +20,13 @@ from nmm.base.errors import InputError, RunError
 from nmm.base.figure_options import FigureOptions
 from nmm.base.machine import made_with
 from nmm.base.text_format import number_text
-from nmm.folders.run import is_run
 from nmm.motion.trajectory import Trajectory
 from nmm.paper import PaperReport, write, write_paper
 from nmm.paper.cases import CASES, CaseResult, Claim, Row
 from nmm.paper.claims import claims, decay_rate, ripple, settling_time, smallest_determinant
 from nmm.paper.write import render
 from nmm.scenario import Scenario
+from nmm.views.folders.run import is_run
 
 Progress = Callable[[float], None]
 

@@ -18,7 +18,7 @@ import yaml
 
 import nmm
 from nmm import figures
-from nmm.figures import FigureOptions
+from nmm.views.figures import FigureOptions
 
 ROOT = Path(__file__).resolve().parent.parent
 SECTION = ROOT / "docs" / "paper_section"

@@ -18,12 +18,12 @@ from nmm.base.errors import InputError, RobotError
 from nmm.base.files import UnwrittenError
 from nmm.model.platforms import Unicycle
 from nmm.model.robots.robot import Robot
-from nmm.playback import Motion, play, wheel_angles, wheel_rates, write_html
-from nmm.playback.keyframes import LARGEST_TURN, ghost_samples, ghost_times, keyframes
-from nmm.playback.meshes import OFF
-from nmm.playback.placements import Placements
-from nmm.playback.scene import playback_scene
-from nmm.playback.shapes import Shape, shapes
+from nmm.views.playback import Motion, play, wheel_angles, wheel_rates, write_html
+from nmm.views.playback.keyframes import LARGEST_TURN, ghost_samples, ghost_times, keyframes
+from nmm.views.playback.meshes import OFF
+from nmm.views.playback.placements import Placements
+from nmm.views.playback.scene import playback_scene
+from nmm.views.playback.shapes import Shape, shapes
 
 fcl = pin.hppfcl
 SHARE = Path(sys.prefix) / "lib" / f"python{sys.version_info[0]}.{sys.version_info[1]}" / "site-packages"

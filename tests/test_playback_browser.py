@@ -32,12 +32,12 @@ from ports import MOST, listening, start_player
 import nmm
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
-from nmm.playback import LiveViewer, Motion
-from nmm.playback.ellipsoids import CLOSE, THINNEST, EllipsoidOptions
-from nmm.playback.extent import corners, robot_boxes
-from nmm.playback.keyframes import ghost_samples, ghost_times, keyframes
-from nmm.playback.placements import Placements
-from nmm.playback.rolling import wheel_angles
+from nmm.views.playback import LiveViewer, Motion
+from nmm.views.playback.ellipsoids import CLOSE, THINNEST, EllipsoidOptions
+from nmm.views.playback.extent import corners, robot_boxes
+from nmm.views.playback.keyframes import ghost_samples, ghost_times, keyframes
+from nmm.views.playback.placements import Placements
+from nmm.views.playback.rolling import wheel_angles
 
 #: Box around the vertices below each visual, in the visual's own frame.
 BOXES = """() => {

@@ -25,8 +25,8 @@ from playback_robot import drive
 from playwright.sync_api import Browser
 
 from nmm.model.robots.robot import Robot
-from nmm.playback import Motion
-from nmm.playback.rolling import wheel_angles
+from nmm.views.playback import Motion
+from nmm.views.playback.rolling import wheel_angles
 
 #: A page that holds one of ours.
 OUTER = (

@@ -17,7 +17,7 @@ from ports import MOST, free_port, listening, start_player, wait_for
 
 from nmm.base.errors import InputError, RunError
 from nmm.model.robots.robot import Robot
-from nmm.playback import LiveViewer, play, wheel_angles
+from nmm.views.playback import LiveViewer, play, wheel_angles
 
 
 @pytest.fixture(scope="module")

@@ -15,12 +15,12 @@ from playback_browser import empty_page as empty_page
 from playback_browser import window as window
 
 import nmm
-from nmm.figures.motion import outlines
 from nmm.model.collisions.obstacle import Passed, obstacle_as_json, obstacle_from_json, shape_from_json
 from nmm.motion.clearance import ROUNDING, swept
-from nmm.playback import Motion, Surroundings
-from nmm.playback.obstacles import REACH
-from nmm.playback.scene import playback_scene
+from nmm.views.figures.motion import outlines
+from nmm.views.playback import Motion, Surroundings
+from nmm.views.playback.obstacles import REACH
+from nmm.views.playback.scene import playback_scene
 
 WEDGE = np.array([[0, 0, 0], [0.3, 0, 0], [0, 0.2, 0], [0, 0, 0.4], [0.1, 0.05, 0.1]])
 

@@ -21,7 +21,7 @@ from playwright.sync_api import Browser, Page
 
 from nmm.base.resolver_style import resolver_styles
 from nmm.motion.trajectory import Trajectory
-from nmm.playback import write_html
+from nmm.views.playback import write_html
 
 NAMES = ("RG", "PG", "EJ")
 #: As it was opened.

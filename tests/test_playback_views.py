@@ -16,9 +16,9 @@ from playback_browser import window as window
 from playback_robot import drive, hand_built_robot
 
 from nmm.model.robots.robot import Robot
-from nmm.playback import Motion, Surroundings
-from nmm.playback.extent import corners, robot_boxes
-from nmm.playback.rolling import wheel_angles
+from nmm.views.playback import Motion, Surroundings
+from nmm.views.playback.extent import corners, robot_boxes
+from nmm.views.playback.rolling import wheel_angles
 
 
 @pytest.fixture(scope="module")

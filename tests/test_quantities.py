@@ -24,10 +24,10 @@ from nmm.control.step.recorded import Recorded
 from nmm.control.step.step import Step
 from nmm.motion.diagnosis.summary import RUN_NUMBERS
 from nmm.motion.table import summary_rows
-from nmm.playback.channels import channels
 from nmm.playback.running import Growing
 from nmm.sweeps.rows import MEASURED
-from nmm.tables import comparison_table
+from nmm.views.playback.channels import channels
+from nmm.views.tables import comparison_table
 
 #: What each older version of the files lacks, by the version that has it first.
 SINCE = {one.name: one.since for one in saved() if one.since > 1}

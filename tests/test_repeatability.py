@@ -19,9 +19,9 @@ from nmm.control.controller import Controller
 from nmm.control.functions.references import Circle
 from nmm.control.functions.tasks import Heading, LinearCoordinates, Position, Task
 from nmm.control.resolvers import CallableResolver, ExtendedJacobian, Problem, ProjectedGradient
-from nmm.figures.repeatability import laps as laps_figure
 from nmm.model.robots.robot import Robot
 from nmm.scenario import Scenario
+from nmm.views.figures.repeatability import laps as laps_figure
 
 Array = NDArray[np.float64]
 

@@ -19,8 +19,8 @@ import nmm
 from nmm.base.errors import InputError
 from nmm.base.files import UnwrittenError, writing
 from nmm.cli.exit_status import status_of
-from nmm.folders import whole
-from nmm.folders.whole import FolderKind, check_folder, replaced_folder, steady
+from nmm.views.folders import whole
+from nmm.views.folders.whole import FolderKind, check_folder, replaced_folder, steady
 
 #: NMM_KILLS=30 kills each command so often; few do not.
 KILLS = int(os.environ.get("NMM_KILLS", "0"))

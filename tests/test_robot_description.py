@@ -20,10 +20,10 @@ import nmm
 from nmm.base.arrays import Array
 from nmm.cli.exit_status import status_of
 from nmm.model.robots.robot import Robot
-from nmm.playback.placements import rolling_joints
 from nmm.ros.description import description, packaged
 from nmm.ros.links import Links
 from nmm.ros.making import root_link
+from nmm.views.playback.placements import rolling_joints
 
 typesys = pytest.importorskip("rosbags.typesys")
 TYPES = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE).types

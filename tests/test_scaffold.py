@@ -17,11 +17,11 @@ from urdf_parts import joint, link, robot, shape, write
 import nmm
 from nmm.base.bundled import bundled_robots
 from nmm.cli.exit_status import status_of
-from nmm.figures.style import figure, save
-from nmm.folders.run import is_run
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading.packages import package_file
 from nmm.scenario.scaffold.end_effector import hands
+from nmm.views.figures.style import figure, save
+from nmm.views.folders.run import is_run
 
 DATA = "package://example-robot-data/robots/"
 Command = Callable[..., Result]

@@ -9,9 +9,9 @@ import pytest
 from live_pages import unpacked
 
 import nmm
-from nmm.playback import Body, Carried, Motion, Surroundings
-from nmm.playback.extent import corners
-from nmm.playback.scene import playback_scene
+from nmm.views.playback import Body, Carried, Motion, Surroundings
+from nmm.views.playback.extent import corners
+from nmm.views.playback.scene import playback_scene
 
 SCENE = {
     "carried": [

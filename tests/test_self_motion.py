@@ -21,7 +21,7 @@ from nmm.base.errors import InputError, SingularError
 from nmm.control.functions.tasks import Pose, Position, Task
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
-from nmm.playback import write_html
+from nmm.views.playback import write_html
 
 Array = NDArray[np.float64]
 

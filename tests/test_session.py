@@ -11,8 +11,8 @@ from ports import listening
 import nmm
 from nmm.base.errors import InputError
 from nmm.playback import session
-from nmm.playback.rolling import RolledRobot, Rolling
 from nmm.playback.session import FPS, LATE, Clock, Session, message
+from nmm.views.playback.rolling import RolledRobot, Rolling
 
 KINDS = {"aim": ("task", "value"), "go": ()}
 

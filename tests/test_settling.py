@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 import nmm
 from nmm.control.sequencing.sequence import Event
-from nmm.figures import comparison
 from nmm.motion.diagnosis.summary import settling_time
+from nmm.views.figures import comparison
 
 
 @pytest.fixture(scope="module")

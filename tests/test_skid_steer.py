@@ -11,7 +11,7 @@ import nmm
 from nmm.cli.runs import describe
 from nmm.model.platforms import Platform, SkidSteer
 from nmm.model.robots.loading.ground import slip_warnings
-from nmm.playback import Motion, wheel_angles, wheel_rates
+from nmm.views.playback import Motion, wheel_angles, wheel_rates
 
 Array = NDArray[np.float64]
 

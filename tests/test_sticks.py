@@ -17,14 +17,14 @@ from playback_robot import drive
 from urdf_parts import AXIS, joint, link, robot, shape, write
 
 import nmm
-from nmm.playback import Motion, view
-from nmm.playback.drawing import Drawing, encode
-from nmm.playback.extent import robot_boxes
-from nmm.playback.keyframes import keyframes
-from nmm.playback.rolling import Rolling
-from nmm.playback.scene import playback_scene
-from nmm.playback.shapes import DrawnRobot
-from nmm.playback.sticks import Appearance, appearance
+from nmm.views.playback import Motion, view
+from nmm.views.playback.drawing import Drawing, encode
+from nmm.views.playback.extent import robot_boxes
+from nmm.views.playback.keyframes import keyframes
+from nmm.views.playback.rolling import Rolling
+from nmm.views.playback.scene import playback_scene
+from nmm.views.playback.shapes import DrawnRobot
+from nmm.views.playback.sticks import Appearance, appearance
 
 UR5 = "package://example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
 LIMIT = '<limit lower="-2" upper="2" effort="1" velocity="1"/>'

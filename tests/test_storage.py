@@ -14,7 +14,7 @@ from findings import refused
 
 import nmm
 from nmm.control.step.quantities import saved
-from nmm.folders.whole import replaced_folder
+from nmm.views.folders.whole import replaced_folder
 
 
 @pytest.fixture(scope="module")

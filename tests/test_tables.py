@@ -22,7 +22,7 @@ from nmm.analysis.redundancy import repeatability
 from nmm.base import latex
 from nmm.cli.exit_status import status_of
 from nmm.motion.verdict import Verdict
-from nmm.tables import Quantity, Table, comparison_table, laps_table
+from nmm.views.tables import Quantity, Table, comparison_table, laps_table
 
 Command = Callable[..., Result]
 SHORT = ("--set", "duration=0.5")

@@ -30,10 +30,10 @@ from ports import MOST, free_port, listening, served
 
 import nmm
 from nmm.model.robots.robot import Robot
-from nmm.playback import view
-from nmm.playback.extent import corners
-from nmm.playback.rolling import Rolling
 from nmm.playback.viewer import asked_for
+from nmm.views.playback import view
+from nmm.views.playback.extent import corners
+from nmm.views.playback.rolling import Rolling
 
 
 @pytest.fixture(scope="module", params=["hand-built", "unicycle_3r", "folding", "car_base"])

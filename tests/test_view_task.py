@@ -22,10 +22,10 @@ from ports import MOST, free_port, listening, wait_for
 import nmm
 from nmm.base.errors import InputError
 from nmm.model.robots.robot import Robot
-from nmm.playback import view
 from nmm.playback.viewed_task import ViewedTask
 from nmm.playback.viewer import asked_for
 from nmm.scenario.short_task import short_task
+from nmm.views.playback import view
 
 UR5 = "package://example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
 

@@ -13,7 +13,7 @@ import nmm
 from nmm.cli.exit_status import status_of
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.wheel_rates import inputs_held_by
-from nmm.playback.rolling import Rolling
+from nmm.views.playback.rolling import Rolling
 
 Array = np.ndarray
 

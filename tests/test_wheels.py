@@ -17,17 +17,17 @@ from scipy.integrate import solve_ivp
 from urdf_parts import joint, link, robot, write
 
 from nmm.base.errors import RobotError
-from nmm.figures.silhouette import Silhouette
 from nmm.model.platforms import Omnidirectional, Unicycle
 from nmm.model.robots.loading import load
 from nmm.model.robots.loading.measured_joints import Measured
 from nmm.model.robots.loading.measured_layout import measure_layout
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.wheel import Wheel
-from nmm.playback import LiveViewer, Motion, wheel_rates, write_html
-from nmm.playback.keyframes import LARGEST_TURN, ghost_samples, keyframes
-from nmm.playback.placements import Placements, rolling_joints
-from nmm.playback.rolling import Rolling, caster_step
+from nmm.views.figures.silhouette import Silhouette
+from nmm.views.playback import LiveViewer, Motion, wheel_rates, write_html
+from nmm.views.playback.keyframes import LARGEST_TURN, ghost_samples, keyframes
+from nmm.views.playback.placements import Placements, rolling_joints
+from nmm.views.playback.rolling import Rolling, caster_step
 
 Array = np.ndarray
 

@@ -18,11 +18,11 @@ from nmm.base.bundled import bundled_scenarios
 from nmm.base.errors import NmmError, expect_known
 from nmm.base.processes import share_out
 from nmm.base.progress import Progress, between
-from nmm.figures import save, stroboscopic
-from nmm.folders.whole import FolderKind, replaced_folder
 from nmm.motion.table import summary_rows
-from nmm.playback.html import page_of, viewer_script
 from nmm.rendering.chromium import HeadlessPage
+from nmm.views.figures import save, stroboscopic
+from nmm.views.folders.whole import FolderKind, replaced_folder
+from nmm.views.playback.html import page_of, viewer_script
 
 #: Marks a folder as one of ours.
 FORMAT, MARKER = "nmm gallery 1", "gallery.json"

@@ -98,11 +98,11 @@ class LogOptions(OptionGroup):
 
 def compare_with_bag(source: str, bag: Path, out: Path | None, names: LogOptions) -> int:
     """Tell how far a bag's motion is from a run's, and write both as a comparison."""
-    from nmm.folders import comparison
-    from nmm.folders.whole import check_folder
     from nmm.motion.trajectory import Trajectory
     from nmm.ros.bag import read_bag
     from nmm.ros.difference import difference
+    from nmm.views.folders import comparison
+    from nmm.views.folders.whole import check_folder
 
     run = Trajectory.load(source)
     folder = out or Path("runs") / f"{Path(source).resolve().name}-compare"

@@ -82,8 +82,8 @@ def map_measures(
     from nmm.analysis.maps.coordinates import check_held, singularity_map
     from nmm.analysis.maps.workspace import check_given, workspace_map
     from nmm.cli.subjects import coordinates_at, studied
-    from nmm.folders.map import is_map
-    from nmm.folders.whole import check_folder
+    from nmm.views.folders.map import is_map
+    from nmm.views.folders.whole import check_folder
 
     drawn = figures.options()
     counts = counts_of(samples)

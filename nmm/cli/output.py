@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rich.console import Console, JustifyMethod
     from rich.progress import Progress, ProgressColumn
 
-    from nmm.tables import Table as PaperTable
+    from nmm.views.tables import Table as PaperTable
 
 #: Exit statuses.
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -67,7 +67,7 @@ def show_table(
 
 def print_table(table: PaperTable, form: str, folder: Path) -> None:
     """The table alone on standard output, as a paper takes it; on standard error where the rest is."""
-    from nmm.tables import FORMS
+    from nmm.views.tables import FORMS
 
     sys.stdout.write(FORMS[form](table))
     sys.stdout.flush()

@@ -70,8 +70,8 @@ def plan(
     none is found.
     """
     from nmm.cli.subjects import scenario_with
-    from nmm.folders.run import is_run
-    from nmm.folders.whole import check_folder
+    from nmm.views.folders.run import is_run
+    from nmm.views.folders.whole import check_folder
 
     if not play:
         browser.refuse("--play")

@@ -32,7 +32,7 @@ def play(folder: RunFolder, browser: Browser, ellipsoids: Ellipsoids) -> None:
 
     In 3D, with MeshCat; only this machine can reach it. Ctrl-C ends it.
     """
-    from nmm.playback import play as play_runs
+    from nmm.views.playback import play as play_runs
 
     drawn = ellipsoids.wanted()
     play_runs(runs_in(folder), **browser.keywords(), ellipsoids=drawn)
@@ -79,9 +79,9 @@ def render(
 
 def runs_in(folder: Path) -> list[Trajectory]:
     """The run of a folder, or those of a comparison, that have samples; `InputError` for none."""
-    from nmm.folders import comparison
-    from nmm.folders.whole import steady
     from nmm.motion.trajectory import Trajectory
+    from nmm.views.folders import comparison
+    from nmm.views.folders.whole import steady
 
     def read() -> list[Trajectory]:
         folders = comparison.runs_of(folder) if comparison.is_comparison(folder) else [folder]
@@ -130,8 +130,8 @@ def view(
     nmm view my_robot.urdf --platform car --lock head=0.3 --no-frames
     """
     from nmm.cli.subjects import configuration_at, is_scenario, opened
-    from nmm.playback import view as show
     from nmm.scenario.short_task import short_task
+    from nmm.views.playback import view as show
 
     keywords = loading.keywords()
     tasks: list[Task | Function] | None = None

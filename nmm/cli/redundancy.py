@@ -98,11 +98,11 @@ def redundancy(
     title = f"{found.robot.name}: {short}"
     motion = moved.trajectory.motion("self-motion")
     if html is not None:
-        from nmm.playback import write_html
+        from nmm.views.playback import write_html
 
         show_text(f"written: {write_html([motion], html, title=title)}")
     if play:
-        from nmm.playback import play as play_motions
+        from nmm.views.playback import play as play_motions
 
         play_motions([motion], **browser.keywords(), title=title)
 
@@ -182,9 +182,9 @@ def laps(
     The folder holds laps.png, laps.csv, summary.json and, for each resolver, a folder with its run.
     """
     from nmm.analysis.redundancy.laps import repeatability
-    from nmm.folders.laps import is_laps, save
-    from nmm.folders.whole import check_folder
     from nmm.scenario import Scenario
+    from nmm.views.folders.laps import is_laps, save
+    from nmm.views.folders.whole import check_folder
 
     kinds = named(resolvers, "--resolvers", "kinds with commas between them, as in rg,pg")
     drawn, changed, form = figures.options(), settings_of(settings), form_of(table)
@@ -201,7 +201,7 @@ def laps(
     if form is None:
         _show(found, made.name, folder)
     else:
-        from nmm.tables import laps_table
+        from nmm.views.tables import laps_table
 
         print_table(laps_table(found), form, folder)
     for one in found.laps:

@@ -47,8 +47,8 @@ if TYPE_CHECKING:
     from nmm.control.controller import Controller
     from nmm.motion.recording import Recorder
     from nmm.motion.trajectory import Trajectory
-    from nmm.playback import LiveRun
     from nmm.scenario import Scenario
+    from nmm.views.playback import LiveRun
 
 
 @command
@@ -88,9 +88,9 @@ def run(
     with --ellipsoids ellipses.png among them.
     Ctrl-C ends the run and writes the part that was computed, marked incomplete.
     """
-    from nmm.folders.comparison import folder_name
-    from nmm.folders.run import is_run
-    from nmm.folders.whole import check_folder
+    from nmm.views.folders.comparison import folder_name
+    from nmm.views.folders.run import is_run
+    from nmm.views.folders.whole import check_folder
 
     if not play:
         browser.refuse("--play")
@@ -110,7 +110,7 @@ def run(
     shown: AbstractContextManager[LiveRun | None] = nullcontext()
     planned = bool(made.parts.moved_by)
     if play and not planned:
-        from nmm.playback import LiveRun
+        from nmm.views.playback import LiveRun
 
         title = f"{made.title or made.name}, {called}"
         around = made.surroundings(controller.robot)
@@ -177,9 +177,9 @@ def compare(
     The folder holds comparison.png, playback.html (all robots in one scene), summary.json and, for each
     resolver, a folder with its run.
     """
-    from nmm.folders import comparison
-    from nmm.folders.whole import check_folder
     from nmm.motion.table import step_time
+    from nmm.views.folders import comparison
+    from nmm.views.folders.whole import check_folder
 
     if str(bag).partition(":")[0] in RESOLVERS and resolvers.endswith(","):
         raise InputError(f"no blanks in --resolvers {resolvers}{bag}")
@@ -220,7 +220,7 @@ def compare(
         comparison.save(trajectories, folder, name, **drawn)
     columns = [dict(describe(trajectory, trajectory.summary())) for trajectory in trajectories]
     if form is not None:
-        from nmm.tables import comparison_table
+        from nmm.views.tables import comparison_table
 
         print_table(comparison_table(trajectories), form, folder)
         return _status("nmm compare", trajectories, folder)
@@ -310,7 +310,7 @@ def _run(
 
 def tell_and_save(trajectory: Trajectory, folder: Path, **asked: Any) -> None:
     """Print a run's table and write its folder."""
-    from nmm.folders.run import save
+    from nmm.views.folders.run import save
 
     width = 0
     gone: OSError | None = None

@@ -204,7 +204,7 @@ def opened(
 
 def _check_folder(source: str, path: Path) -> None:
     """`InputError` for a folder that is no run's; it names the runs inside, which `nmm compare` leaves."""
-    from nmm.folders.run import is_run
+    from nmm.views.folders.run import is_run
 
     if is_run(path):
         return

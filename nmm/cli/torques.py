@@ -47,8 +47,8 @@ def torques(
     """
     from nmm.cli.document import print_json
     from nmm.cli.subjects import opened
-    from nmm.folders.torques import is_torques, save
-    from nmm.folders.whole import check_folder
+    from nmm.views.folders.torques import is_torques, save
+    from nmm.views.folders.whole import check_folder
 
     drawn = figures.options()
     run, scenario, robot = opened(source, settings, {})

@@ -18,7 +18,7 @@ from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import CENTER_OF_MASS
 from nmm.motion.diagnosis.reasons import out_of_reach, stretched
-from nmm.playback.rolling import RolledRobot
+from nmm.views.playback.rolling import RolledRobot
 
 #: A robot farther away than this, m, has diverged.
 LOST = 1e4

@@ -25,9 +25,9 @@ from nmm.model.robots.frame_path import FramePath
 from nmm.model.robots.motion import Motion
 from nmm.plans.plan import Plan
 from nmm.plans.planned import plan
-from nmm.playback.drawing import Command, packed
-from nmm.playback.keyframes import ghost_samples
-from nmm.playback.shapes import DrawnRobot
+from nmm.views.playback.drawing import Command, packed
+from nmm.views.playback.keyframes import ghost_samples
+from nmm.views.playback.shapes import DrawnRobot
 
 #: How long a plan is looked for, s, and how much more than the controller it keeps, m.
 SECONDS, MARGIN = 5.0, 0.05

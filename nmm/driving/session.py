@@ -24,11 +24,11 @@ from nmm.driving.setups import Choice, DriveSetup, named
 from nmm.model.robots.motion import Camera
 from nmm.motion.components import Axes
 from nmm.motion.seen import SeenPoints
-from nmm.playback.cameras import live_numbers
-from nmm.playback.channels import live_channels
-from nmm.playback.drawing import Drawing, encode
 from nmm.playback.server import Visitor
 from nmm.playback.session import FPS, RobotSession
+from nmm.views.playback.cameras import live_numbers
+from nmm.views.playback.channels import live_channels
+from nmm.views.playback.drawing import Drawing, encode
 
 #: Samples that a new page gets, at FPS.
 KEPT = int(30 * FPS)

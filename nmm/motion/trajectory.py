@@ -262,8 +262,8 @@ class Trajectory:
     def save(
         self, folder: str | Path, *, figures: Drawn = True, html: bool = False, ellipsoids: Wanted = False
     ) -> Path:
-        """Write the run's folder (see `nmm.folders.run.save`): arrays, tables, summary, figures, playback."""
-        return lazy_call("nmm.folders.run:save")(
+        """Write the run's folder (see `nmm.views.folders.run.save`): arrays, tables, summary, figures, playback."""
+        return lazy_call("nmm.views.folders.run:save")(
             self, folder, figures=figures, html=html, ellipsoids=ellipsoids
         )
 
@@ -288,15 +288,15 @@ class Trajectory:
         ------
         InputError : it is no run's folder, or its robot cannot be loaded, or is another one
         """
-        return lazy_call("nmm.folders.run:load")(folder, robot)
+        return lazy_call("nmm.views.folders.run:load")(folder, robot)
 
     def plot(self, **options: float) -> Figure:
         """One figure that shows the run: the motion from above, errors, objective, inputs; `width`, in."""
-        return lazy_call("nmm.figures:overview")(self, **options)
+        return lazy_call("nmm.views.figures:overview")(self, **options)
 
     def plot_ellipses(self, path: str | Path | None = None, options: Wanted = True) -> Figure:
-        """The end-effector's path with manipulability ellipses; also as a file (`nmm.figures.ellipses`)."""
-        return lazy_call("nmm.figures.ellipses:ellipses")(self, options, path)
+        """The end-effector's path with manipulability ellipses; also as a file (`nmm.views.figures.ellipses`)."""
+        return lazy_call("nmm.views.figures.ellipses:ellipses")(self, options, path)
 
     def torques(self, payload: Mapping[str, Any] | None = None) -> Torques:
         """What the motion asks of the motors, with masses carried, kg by frame (see `nmm.Dynamics`); what the
@@ -334,11 +334,13 @@ class Trajectory:
 
     def play(self, *, port: int | None = None, open_browser: bool = True, ellipsoids: Wanted = False) -> None:
         """Play the motion in a browser with MeshCat; returns when the user ends it (Ctrl-C)."""
-        lazy_call("nmm.playback:play")([self], port=port, open_browser=open_browser, ellipsoids=ellipsoids)
+        lazy_call("nmm.views.playback:play")(
+            [self], port=port, open_browser=open_browser, ellipsoids=ellipsoids
+        )
 
     def _repr_html_(self) -> str | None:
         """In a notebook: the page that plays it."""
-        page: str | None = lazy_call("nmm.playback.html:of_run")(self)
+        page: str | None = lazy_call("nmm.views.playback.html:of_run")(self)
         return page
 
 

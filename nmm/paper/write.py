@@ -15,14 +15,14 @@ from nmm.base.figure_options import PLAIN, FigureOptions
 from nmm.base.processes import share_out
 from nmm.base.progress import Progress, between
 from nmm.base.templates import template
-from nmm.folders.whole import FolderKind, replaced_folder
 from nmm.motion.trajectory import Outcome, Trajectory
 from nmm.paper.cases import CASES, DT, RESOLVERS, Case, CaseResult, Claim
 from nmm.paper.claims import claims, smallest_determinant, table
+from nmm.views.folders.whole import FolderKind, replaced_folder
 
 if TYPE_CHECKING:
     from nmm.scenario import Scenario
-    from nmm.tables import Table
+    from nmm.views.tables import Table
 
 is_paper = FolderKind("nmm paper 1", "paper.json")
 
@@ -43,7 +43,7 @@ class PaperReport:
 
     def table(self) -> Table:
         """The numbers of all runs, a column each: "1 RG", "1 PG", "2 RG", ...; read from the folder."""
-        from nmm.tables import comparison_table
+        from nmm.views.tables import comparison_table
 
         runs = []
         for case in CASES:
@@ -115,7 +115,7 @@ def render(results: Sequence[CaseResult]) -> str:
 def run_case(number: int, progress: Progress, folder: Path, figures: FigureOptions) -> CaseResult:
     """Run a case with RG and PG, and write its files into the existing `folder`; RunError if a run did not
     reach its end, KeyboardInterrupt if it was interrupted."""
-    from nmm.playback import write_html
+    from nmm.views.playback import write_html
 
     began = time.perf_counter()
     case = CASES[number - 1]
@@ -153,8 +153,8 @@ def _runs(case: Case, progress: Progress | None) -> list[Trajectory]:
 
 
 def _write_figures(case: Case, rg: Trajectory, pg: Trajectory, folder: Path, figures: FigureOptions) -> None:
-    from nmm.figures import objective_comparison, stroboscopic, tracking
-    from nmm.figures.style import save_as
+    from nmm.views.figures import objective_comparison, stroboscopic, tracking
+    from nmm.views.figures.style import save_as
 
     (motion, _), (objective, _) = case.figures
     across = figures.across()

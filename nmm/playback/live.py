@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 from nmm.base.arrays import vector
 from nmm.base.ellipsoid_options import Wanted
 from nmm.model.robots.robot import Robot
-from nmm.playback.rolling import RolledRobot
-from nmm.playback.scene import Shown, playback_scene
 from nmm.playback.server import Visitor
 from nmm.playback.session import RobotSession, Session
+from nmm.views.playback.rolling import RolledRobot
+from nmm.views.playback.scene import Shown, playback_scene
 
 
 def play(

@@ -27,13 +27,13 @@ from nmm.motion.recording import Recorder
 from nmm.motion.seen import SeenPoints
 from nmm.motion.shown_frame import shown_frame
 from nmm.motion.trajectory import Trajectory
-from nmm.playback.cameras import live_numbers
-from nmm.playback.channels import live_channels, partition_text
-from nmm.playback.drawing import Drawing, encode, packed
-from nmm.playback.rolling import RolledRobot
-from nmm.playback.scene import playback_scene
 from nmm.playback.server import Visitor
 from nmm.playback.session import RobotSession, Watching, counted
+from nmm.views.playback.cameras import live_numbers
+from nmm.views.playback.channels import live_channels, partition_text
+from nmm.views.playback.drawing import Drawing, encode, packed
+from nmm.views.playback.rolling import RolledRobot
+from nmm.views.playback.scene import playback_scene
 
 #: Samples per second of a page's curves at most, besides those of its pictures, Hz.
 KEPT = 60.0

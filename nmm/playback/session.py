@@ -21,15 +21,15 @@ from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.robots.motion import Camera
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.surroundings import NO_SURROUNDINGS, Surroundings
-from nmm.playback.cameras import draw_camera, tell_cameras
-from nmm.playback.channels import Channel, Channels, draw_curves
-from nmm.playback.drawing import Command, Drawing, encode
-from nmm.playback.extent import robot_boxes
-from nmm.playback.html import socket_page
-from nmm.playback.rolling import RolledRobot
-from nmm.playback.scene import draw_beside, live_scene, still
 from nmm.playback.server import PageServer, Visitor
-from nmm.playback.sticks import appearance
+from nmm.views.playback.cameras import draw_camera, tell_cameras
+from nmm.views.playback.channels import Channel, Channels, draw_curves
+from nmm.views.playback.drawing import Command, Drawing, encode
+from nmm.views.playback.extent import robot_boxes
+from nmm.views.playback.html import socket_page
+from nmm.views.playback.rolling import RolledRobot
+from nmm.views.playback.scene import draw_beside, live_scene, still
+from nmm.views.playback.sticks import appearance
 
 FPS = 30.0
 #: The clock skips the time of a picture later than this, s.

@@ -19,11 +19,11 @@ from nmm.control.functions.function import Function
 from nmm.control.functions.tasks.task import Task
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
-from nmm.playback.drawing import Command, Drawing, encode
-from nmm.playback.ellipsoids import ARM_COLOR, OPACITY, THINNEST, draw_legend
-from nmm.playback.extent import extent_of
 from nmm.playback.server import Visitor
 from nmm.playback.session import message
+from nmm.views.playback.drawing import Command, Drawing, encode
+from nmm.views.playback.ellipsoids import ARM_COLOR, OPACITY, THINNEST, draw_legend
+from nmm.views.playback.extent import extent_of
 
 #: A direction is nearly lost where σ_min is below this share of σ_max, rows in natural sizes.
 NEAR = 0.05

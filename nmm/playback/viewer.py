@@ -19,14 +19,14 @@ from nmm.model.robots.motion import Motion
 from nmm.model.robots.reach import first_tip, tips
 from nmm.model.robots.robot import Robot
 from nmm.motion.shown_frame import shown_frame
-from nmm.playback.drawing import Command, Drawing, segment
-from nmm.playback.extent import robot_boxes
-from nmm.playback.html import HEIGHT, file_page, framed
-from nmm.playback.placements import joint_screw, position_and_quaternion
-from nmm.playback.rolling import Rolling
-from nmm.playback.scene import draw_beside, live_scene, points_beside, still
 from nmm.playback.session import Session
-from nmm.playback.shapes import DrawnRobot
+from nmm.views.playback.drawing import Command, Drawing, segment
+from nmm.views.playback.extent import robot_boxes
+from nmm.views.playback.html import HEIGHT, file_page, framed
+from nmm.views.playback.placements import joint_screw, position_and_quaternion
+from nmm.views.playback.rolling import Rolling
+from nmm.views.playback.scene import draw_beside, live_scene, points_beside, still
+from nmm.views.playback.shapes import DrawnRobot
 
 if TYPE_CHECKING:
     from nmm.playback.viewed_task import ViewedTask

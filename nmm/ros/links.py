@@ -9,8 +9,8 @@ import pinocchio as pin
 
 from nmm.base.arrays import Array
 from nmm.model.robots.robot import Robot
-from nmm.playback.placements import Placements, position_and_quaternion
 from nmm.ros.making import base_joint
+from nmm.views.playback.placements import Placements, position_and_quaternion
 
 #: Pinocchio's kinds of frames that are links: a file's, and those of a model made by hand.
 _LINKS = ("BODY", "OP_FRAME")

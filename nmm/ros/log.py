@@ -14,11 +14,11 @@ from nmm.base.arrays import Array, scalar
 from nmm.base.errors import InputError, expect, few
 from nmm.base.files import replaceable, whole_file, written_at
 from nmm.model.robots.configuration import Configuration
-from nmm.playback.placements import position_and_quaternion, rolling_joints
-from nmm.playback.rolling import Rolling
 from nmm.ros.description import description
 from nmm.ros.links import Links
 from nmm.ros.making import Messages
+from nmm.views.playback.placements import position_and_quaternion, rolling_joints
+from nmm.views.playback.rolling import Rolling
 
 if TYPE_CHECKING:
     from nmm.motion.trajectory import Trajectory

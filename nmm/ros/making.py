@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from nmm.base.arrays import Array, array, matrix, scalar, vector
 from nmm.base.errors import InputError, expect
 from nmm.model.robots.robot import Robot
-from nmm.playback.placements import position_and_quaternion
+from nmm.views.playback.placements import position_and_quaternion
 
 
 class Rclpy(Mapping[str, type]):

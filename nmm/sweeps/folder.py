@@ -11,10 +11,10 @@ from typing import Any
 
 from nmm.base.errors import InputError
 from nmm.base.files import taken, whole_file, written_at
-from nmm.folders.whole import FolderKind, check_folder
 from nmm.scenario.numbers import shown
 from nmm.sweeps.definition import Definition
 from nmm.sweeps.rows import Computed, arrow, columns_of, parquet, rows_of
+from nmm.views.folders.whole import FolderKind, check_folder
 
 is_sweep = FolderKind("nmm sweep 1", "sweep.json")
 TABLE = "rows.parquet"

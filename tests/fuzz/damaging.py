@@ -13,7 +13,7 @@ import numpy as np
 import yaml
 
 import nmm
-from nmm.folders import comparison
+from nmm.views.folders import comparison
 
 #: What stands in the place of a value in JSON or YAML.
 WRONG: tuple[Any, ...] = (

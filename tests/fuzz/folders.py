@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from nmm.base.errors import NmmError
 from nmm.cli.playing import runs_in
-from nmm.playback.html import page_of
+from nmm.views.playback.html import page_of
 
 from .damaging import copied, damage, whole_folders
 from .hunting import Hunt, refused

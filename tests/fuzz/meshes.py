@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 import nmm
 from nmm.base.errors import NmmError
-from nmm.figures.silhouette import platform_shapes
-from nmm.playback.shapes import shapes
+from nmm.views.figures.silhouette import platform_shapes
+from nmm.views.playback.shapes import shapes
 
 from .hunting import Hunt, refused
 from .mutants import CUTS, VALUES, damaged

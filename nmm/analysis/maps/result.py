@@ -219,11 +219,11 @@ class Map:
 
     def summary(self) -> dict[str, Any]:
         """What was computed, in plain data."""
-        return lazy_call("nmm.folders.map:summary")(self)
+        return lazy_call("nmm.views.folders.map:summary")(self)
 
     def plot(self, measure: str | None = None, path: str | Path | None = None) -> Figure:
         """The figure of a measure (the first one by default); written, too, where a path is given."""
-        return lazy_call("nmm.figures.maps:map_figure")(self, measure, path)
+        return lazy_call("nmm.views.figures.maps:map_figure")(self, measure, path)
 
     def save(self, folder: str | Path, *, figures: FigureOptions = PLAIN) -> Path:
         """Write map.npz, map.json and a figure a measure.
@@ -237,4 +237,4 @@ class Map:
         ------
         InputError : the folder exists and is not a map's, or cannot be written
         """
-        return lazy_call("nmm.folders.map:save")(self, folder, figures=figures)
+        return lazy_call("nmm.views.folders.map:save")(self, folder, figures=figures)

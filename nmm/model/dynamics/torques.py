@@ -173,11 +173,11 @@ class Torques:
 
     def save(self, folder: str | Path) -> Path:
         """Write torques.csv, summary.json and torques.png to a folder, replacing one of torques."""
-        return lazy_call("nmm.folders.torques:save")(self, folder)
+        return lazy_call("nmm.views.folders.torques:save")(self, folder)
 
     def plot(self) -> Figure:
         """Torques over their limits, and the margin against tipping."""
-        return lazy_call("nmm.figures.torques:torques")(self)
+        return lazy_call("nmm.views.figures.torques:torques")(self)
 
 
 def torques_along(

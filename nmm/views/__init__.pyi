@@ -1,0 +1,4 @@
+from . import figures as figures
+from . import folders as folders
+from . import playback as playback
+from . import tables as tables

@@ -1,0 +1,221 @@
+"""Validation of a folder's JSON and arrays: keys, kinds of values, shapes."""
+
+import zipfile
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, FiniteFloat, PositiveFloat, ValidationError
+
+from nmm.base.arrays import increasing
+from nmm.base.errors import InputError, expect
+from nmm.base.files import expect_file, read_bytes
+from nmm.base.machine import SHARE, free_memory
+from nmm.base.text_format import one_line, printable
+from nmm.control.step.quantities import saved
+from nmm.motion.residuals import NO_RESIDUALS
+from nmm.motion.trajectory import Outcome
+from nmm.scenario.keys import first_error
+from nmm.scenario.yaml_text import dotted
+from nmm.views.folders.whole import MOST
+
+#: Larger values belong to diverged motions, and overflow when drawn.
+LARGEST = 1e30
+
+
+class Told(BaseModel):
+    """A mapping of a folder's JSON; other keys are ignored."""
+
+    model_config = ConfigDict(strict=True, frozen=True)
+
+
+class ToldRobot(Told):
+    name: str
+    source: str
+    arguments: dict[str, str]
+    fingerprint: str | None = None
+
+
+class ToldEvent(Told):
+    t: FiniteFloat
+    task: str
+    what: str
+    why: str
+
+
+class ToldFinding(Told):
+    code: str
+    values: dict[str, Any] = {}
+    where: dict[str, Any] = {}
+    text: str
+    line: str
+
+
+class ToldObstacle(Told):
+    name: str
+    shape: dict[str, Any]
+
+
+class ToldGoal(Told):
+    point: int
+    x: int
+    y: int
+    intrinsics: tuple[PositiveFloat, PositiveFloat, FiniteFloat, FiniteFloat]
+
+
+class ToldCamera(Told):
+    frame: str
+    points: tuple[int, ...]
+    goals: tuple[ToldGoal, ...]
+    border: tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat]
+    bounded: bool
+    intrinsics: tuple[PositiveFloat, PositiveFloat, FiniteFloat, FiniteFloat]
+    lines: tuple[tuple[int, int], ...]
+
+
+class ToldRun(Told):
+    """summary.json of a run; values with a default may be absent in older ones."""
+
+    format: str
+    robot: ToldRobot
+    r_names: tuple[str, ...]
+    r_units: tuple[str, ...]
+    resolver: str
+    method: str
+    dt: PositiveFloat
+    outcome: Outcome
+    message: str
+    warnings: tuple[str, ...]
+    findings: tuple[ToldFinding, ...] | None = None
+    frame: str | None
+    samples: int | None = None
+    label: str = ""
+    limited: bool = False
+    kinematics_off: float | None = None
+    limit_names: tuple[str, ...] = ()
+    clearance_names: tuple[str, ...] = ()
+    clearance_asked: FiniteFloat = 0.0
+    obstacles: tuple[ToldObstacle, ...] | None = None
+    events: tuple[ToldEvent, ...] = ()
+    cameras: tuple[ToldCamera, ...] = ()
+    made_with: dict[str, str | int] = {}
+    unmet_samples: int = NO_RESIDUALS.samples
+    unmet_share: float = NO_RESIDUALS.share
+    unmet_largest: float = NO_RESIDUALS.largest
+    unmet_relative: float = NO_RESIDUALS.relative
+    unmet_t: float = NO_RESIDUALS.t
+
+
+class ToldFormat(Told):
+    format: str
+
+
+class ToldComparison(ToldFormat):
+    """summary.json of a comparison, with its runs by folder."""
+
+    runs: dict[str, Any]
+
+
+Kind = TypeVar("Kind", bound=Told)
+
+
+def read_checked(path: Path, kind: type[Kind], format_: str) -> Kind:
+    """A JSON file's content; InputError names the file, the key and what was expected."""
+    with _reading(path):
+        content = read_bytes(path, MOST)
+    said = _checked(path, content, ToldFormat).format
+    if said != format_:
+        same = said.rpartition(" ")[0] == format_.rpartition(" ")[0]
+        what = "written by another version of nmm" if same else ""
+        raise InputError(what, where=f"{path}: format", expected=repr(format_), got=said)
+    return _checked(path, content, kind)
+
+
+def _checked(path: Path, content: bytes, kind: type[Kind]) -> Kind:
+    try:
+        return kind.model_validate_json(content)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        if first["type"] == "json_invalid":
+            raise InputError(f"not valid JSON: {first['ctx']['error']}", where=path) from None
+        wrong = first_error(error, {})
+        raise wrong.at(f"{path}: {dotted(wrong.place)}" if wrong.place else path, InputError) from None
+
+
+def read_arrays(path: Path) -> dict[str, Any]:
+    """All arrays of an npz file; InputError names the file and a damaged array."""
+    name, found = "", {}
+    with _reading(path):
+        expect_file(path)
+        try:
+            with zipfile.ZipFile(path) as archive:
+                size, free = sum(info.file_size for info in archive.infolist()), SHARE * free_memory()
+            if size > free:
+                holds = f"holds {size / 1e9:.3g} GB, and {free / 1e9:.3g} GB of memory may be filled"
+                raise InputError(holds, where=path)
+            with np.load(path, allow_pickle=False) as file:
+                for name in file.files:
+                    found[name] = file[name]
+        except (InputError, OSError):
+            raise
+        except Exception as error:  # zipfile, zlib and numpy raise whatever they meet in a damaged file
+            entry = f"{one_line(name)}: " if name else ""
+            reason = one_line(str(error)) or type(error).__name__
+            damaged = f"{printable(entry)}damaged, or not what nmm wrote: {printable(reason)}"
+            raise InputError(damaged, where=path) from None
+    return found
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except FileNotFoundError:
+        raise InputError("this file is missing", where=path) from None
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror or error}", where=path) from None
+
+
+def check_arrays(found: dict[str, Any], path: Path, limits: int, pairs: int) -> None:
+    """InputError for a run's array that is missing, or of another kind or shape than summary.json implies."""
+    lengths = {"L": limits, "K": np.size(found.get("t", ())) if pairs else 0}
+    for one in saved():
+        name = one.name
+        if name not in found:
+            if (one.since == 1 and not one.optional) or (pairs and one.shape.startswith("K")):
+                raise InputError("this array is missing", where=f"{path}: {name}")
+            continue
+        array, where = found[name], f"{path}: {name}"
+        fits = array.dtype.kind == ("i" if one.whole else "f") and array.dtype.itemsize == 8
+        expect(fits, where, f"{'whole ' if one.whole else ''}numbers of 64 bits", str(array.dtype))
+        expect(array.ndim == len(one.shape), where, f"{len(one.shape)} axes", array)
+        expected = [
+            int(letter) if letter.isdigit() else lengths.setdefault(letter, length)
+            for letter, length in zip(one.shape, array.shape, strict=True)
+        ]
+        expect(expected == list(array.shape), where, f"shape {tuple(expected)}", array)
+        finite = not one.finite or np.all(np.abs(array) <= LARGEST)
+        expect(finite, where, f"finite numbers, none beyond {LARGEST:g}")
+        beyond = one.bounded and np.any(np.abs(array[np.isfinite(array)]) > LARGEST)
+        expect(not beyond, where, f"numbers, none beyond {LARGEST:g}")
+    increasing(found["t"], f"{path}: t")
+    counts = {"m": found["u"].shape[1], "p": pairs}
+    for one in saved():
+        if one.counts is not None and one.name in found:
+            letter, words = one.counts
+            indices, count = found[one.name], counts[letter]
+            fits = np.all((indices >= -1) & (indices < count))
+            expect(fits, f"{path}: {one.name}: {words}", f"numbers from -1 to {count - 1}", indices)
+
+
+def check_placements(places: Any, where: str, lengths: Collection[int]) -> None:
+    """InputError unless placements (K, 4, 4), rotations and m, of one of those numbers of samples."""
+    fits = places.dtype == np.float64 and places.shape[1:] == (4, 4) and len(places) in lengths
+    expect(fits, where, "placements, (K, 4, 4)", places)
+    turned = places[:, :3, :3]
+    square = np.einsum("kij,kil->kjl", turned, turned)
+    rigid = np.abs(square - np.eye(3)).max(initial=0.0) < 1e-6 and np.all(np.linalg.det(turned) > 0.0)
+    fits = np.isfinite(places).all() and rigid and np.all(places[:, 3] == [0.0, 0.0, 0.0, 1.0])
+    expect(fits, where, "rotations and finite translations")
