@@ -51,7 +51,7 @@ def film() -> None:
 
 def one_case() -> None:
     """`nmm paper` with one case, in this process, whose files are computed once."""
-    from nmm.paper import write
+    from nmm.cli.paper import write
 
     kept = Path.cwd().parent / "case"
 

@@ -414,7 +414,7 @@ def test_paper_hands_over_the_folder_and_prints_the_claims(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """`write_paper` has its own tests; here it is what the command makes of its report."""
-    import nmm.paper
+    import nmm.cli.paper
 
     for holds, status in ((True, 0), (False, 1)):
         case = SimpleNamespace(number=1, claims=[SimpleNamespace(statement="RG is faster", holds=holds)])
@@ -431,7 +431,7 @@ def test_paper_hands_over_the_folder_and_prints_the_claims(
             asked += [folder, progress, figures]
             return report
 
-        monkeypatch.setattr(nmm.paper, "write_paper", write_paper)
+        monkeypatch.setattr(nmm.cli.paper, "write_paper", write_paper)
         result = run("paper", "--out", "here", "--format", "pdf", "--width", "column")
         assert result.status == status
         assert result.value("1").split() == ["RG", "is", "faster", "yes" if holds else "NO"]

@@ -25,12 +25,12 @@ from small_pictures import draw_only
 from worked_examples import FILES, write_examples
 
 import nmm
-import nmm.paper
+import nmm.cli.paper
 from nmm.base.bundled import bundled_scenarios
 from nmm.base.kinds import OBJECTIVES, PLATFORMS, REFERENCES, RESOLVERS, TASKS, Kinds
 from nmm.cli.app import app
 from nmm.cli.exit_status import status_of
-from nmm.paper import write
+from nmm.cli.paper import write
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = ["README.md", *(path.relative_to(ROOT).as_posix() for path in sorted(ROOT.glob("docs/**/*.md")))]
@@ -112,7 +112,7 @@ def paper_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         return replace(reports[0], folder=Path(folder), index=Path(folder, "index.html"))
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(nmm.paper, "write_paper", write_paper)
+        patch.setattr(nmm.cli.paper, "write_paper", write_paper)
         yield
 
 

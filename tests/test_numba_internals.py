@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from nmm.base.kernels import compiled, numba_internals
+from nmm.cli.paper.cases import CASES
 from nmm.motion.trajectory import Trajectory
-from nmm.paper.cases import CASES
 from nmm.scenario import Scenario
 
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
@@ -95,7 +95,7 @@ print(json.dumps(answers))
 #: The first second, s: 200 samples, among them the initial error's.
 SHORT = {"duration": 1.0}
 RUNS = f"""
-from nmm.paper.cases import CASES
+from nmm.cli.paper.cases import CASES
 from nmm.scenario import Scenario
 for case in CASES:
     for resolver in ("rg", "pg"):

@@ -20,11 +20,11 @@ from nmm.base.errors import InputError, RunError
 from nmm.base.figure_options import FigureOptions
 from nmm.base.machine import made_with
 from nmm.base.text_format import number_text
+from nmm.cli.paper import PaperReport, write, write_paper
+from nmm.cli.paper.cases import CASES, CaseResult, Claim, Row
+from nmm.cli.paper.claims import claims, decay_rate, ripple, settling_time, smallest_determinant
+from nmm.cli.paper.write import render
 from nmm.motion.trajectory import Trajectory
-from nmm.paper import PaperReport, write, write_paper
-from nmm.paper.cases import CASES, CaseResult, Claim, Row
-from nmm.paper.claims import claims, decay_rate, ripple, settling_time, smallest_determinant
-from nmm.paper.write import render
 from nmm.scenario import Scenario
 from nmm.views.folders.run import is_run
 

@@ -92,7 +92,7 @@ def test_a_process_that_dies_is_noticed() -> None:
 
 INTERRUPTIBLE = """
 import sys
-from nmm.paper import write_paper
+from nmm.cli.paper import write_paper
 
 if __name__ == "__main__":
     try:

@@ -251,7 +251,7 @@ def paper(
     Section VI: the four cases with RG and PG, figures 3 to 10, and the numbers that the paper claims.
     Open index.html in the folder: it shows all of it, with the motions to play. Takes less than a minute.
     """
-    from nmm.paper import write_paper
+    from nmm.cli.paper import write_paper
 
     drawn, form = figures.options(), form_of(table)
     with progress("the paper's four cases") as report:

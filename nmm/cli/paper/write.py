@@ -15,9 +15,9 @@ from nmm.base.figure_options import PLAIN, FigureOptions
 from nmm.base.processes import share_out
 from nmm.base.progress import Progress, between
 from nmm.base.templates import template
+from nmm.cli.paper.cases import CASES, DT, RESOLVERS, Case, CaseResult, Claim
+from nmm.cli.paper.claims import claims, smallest_determinant, table
 from nmm.motion.trajectory import Outcome, Trajectory
-from nmm.paper.cases import CASES, DT, RESOLVERS, Case, CaseResult, Claim
-from nmm.paper.claims import claims, smallest_determinant, table
 from nmm.views.folders.whole import FolderKind, replaced_folder
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def write_paper(
 def render(results: Sequence[CaseResult]) -> str:
     """The page of these cases, with relative links only."""
     holding = [claim.holds for result in results for claim in result.claims]
-    return template("nmm.paper", "templates", "index.html").render(
+    return template("nmm.cli.paper", "templates", "index.html").render(
         cases=[(CASES[result.number - 1], result) for result in results],
         resolvers=RESOLVERS,
         dt_ms=f"{1000.0 * DT:g}",

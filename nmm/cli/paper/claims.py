@@ -9,7 +9,7 @@ import numpy as np
 
 from nmm.base.arrays import Array
 from nmm.base.text_format import number_text
-from nmm.paper.cases import Case, Claim, Row
+from nmm.cli.paper.cases import Case, Claim, Row
 
 if TYPE_CHECKING:
     from nmm.control.controller import Controller
