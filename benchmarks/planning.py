@@ -23,7 +23,7 @@ import numpy as np
 import pinocchio as pin
 
 import nmm
-from nmm.plans import search
+from nmm.plugins.planning import search
 
 DISTANCE = 0.03
 #: Among what moves, how long it is looked at after the end of its motion, s.

@@ -23,8 +23,8 @@ import numpy as np
 from planning import DISTANCE, KINDS, LIMITS, SIX, Scene, checked
 
 import nmm
-from nmm.plans.plan import Asked
-from nmm.plans.search import Search
+from nmm.plugins.planning.plan import Asked
+from nmm.plugins.planning.search import Search
 
 #: What OMPL may take, s.
 SECONDS = 10.0

@@ -117,11 +117,11 @@ from .motion.disturbances import Disturbances as Disturbances
 from .motion.simulation import simulate as simulate
 from .motion.trajectory import Outcome as Outcome
 from .motion.trajectory import Trajectory as Trajectory
-from .plans.horizon import Horizon as Horizon
-from .plans.parking import Parking as Parking
-from .plans.plan import Plan as Plan
-from .plans.planned import plan as plan
-from .plans.replan import replan as replan
+from .plugins.planning.horizon import Horizon as Horizon
+from .plugins.planning.parking import Parking as Parking
+from .plugins.planning.plan import Plan as Plan
+from .plugins.planning.planned import plan as plan
+from .plugins.planning.replan import replan as replan
 from .robots.odometry import Odometry as Odometry
 from .rollouts.rollout import rollout as rollout
 from .ros.bag import read_bag as read_bag

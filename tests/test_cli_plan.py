@@ -7,7 +7,7 @@ import pytest
 
 import nmm
 from nmm.cli.exit_status import status_of
-from nmm.plans.search import Search
+from nmm.plugins.planning.search import Search
 
 POSE = "x=2,y=1,theta=pi/2"
 

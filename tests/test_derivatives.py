@@ -42,8 +42,8 @@ from nmm.control.functions.tasks.task import Comparison
 from nmm.control.resolvers import ProjectedGradient
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
-from nmm.plans.following import FromPlan
-from nmm.plans.parking import Parking
+from nmm.plugins.planning.following import FromPlan
+from nmm.plugins.planning.parking import Parking
 
 Array = NDArray[np.float64]
 

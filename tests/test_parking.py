@@ -8,7 +8,7 @@ import pytest
 import nmm
 from nmm.base.errors import InputError
 from nmm.control.functions.program import Program
-from nmm.plans import parking
+from nmm.plugins.planning import parking
 
 GOAL = nmm.Goal(0.001, 0.001)
 POSE = (0.5, -1.0, 2.0)

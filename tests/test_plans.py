@@ -8,7 +8,7 @@ import pytest
 from sliding_arm import sliding
 
 import nmm
-from nmm.plans import words
+from nmm.plugins.planning import words
 
 UR5 = "package://example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
 LIMITS = nmm.Limits(velocity={"platform": 1.0, "arm": 1.5}, acceleration={"platform": 1.0, "arm": 3.0})

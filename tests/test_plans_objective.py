@@ -10,8 +10,8 @@ import pytest
 from test_smoothing import BEHIND, LIMITS, WALL, check, prepared
 
 import nmm
-from nmm.plans.objective import SampleCosts
-from nmm.plans.shooting import Shooting
+from nmm.plugins.planning.objective import SampleCosts
+from nmm.plugins.planning.shooting import Shooting
 
 W = nmm.Manipulability("ee", "xyz", of="arm")
 START = {"q1": 0.5, "q2": -0.4, "q3": 0.2}  # a straight arm has no slope of W

@@ -5,11 +5,11 @@ import pytest
 from test_smoothing import LIMITS, check
 
 import nmm
-from nmm.plans.plan import Asked
-from nmm.plans.search import Search
-from nmm.plans.search_space import USUAL
-from nmm.plans.smoothing import Smoothing
-from nmm.plans.towing import STEADY, RoughMotion, least_radius
+from nmm.plugins.planning.plan import Asked
+from nmm.plugins.planning.search import Search
+from nmm.plugins.planning.search_space import USUAL
+from nmm.plugins.planning.smoothing import Smoothing
+from nmm.plugins.planning.towing import STEADY, RoughMotion, least_radius
 
 STRAIGHT = {"hitch1": 0.0, "hitch2": 0.0}
 

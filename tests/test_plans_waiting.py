@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import nmm
-from nmm.plans import planned
+from nmm.plugins.planning import planned
 
 LIMITS = nmm.Limits(velocity={"platform": 1.0, "arm": 1.5}, acceleration={"platform": 1.0, "arm": 3.0})
 WALL = nmm.Obstacle(nmm.Box([0.2, 4.0, 2.0]), [3.0, -2.5, 0.5], name="wall")

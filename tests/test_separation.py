@@ -6,7 +6,10 @@ import pytest
 import nmm
 from nmm.base.kernels.kinematics import axes, place_joints
 from nmm.base.kernels.record_layout import views
-from nmm.collisions.legs_check import (
+from nmm.model.collisions.pairs import random_configurations
+from nmm.model.collisions.separation import CLOSE
+from nmm.model.robots.zero_order_hold import HeldInputs
+from nmm.plugins.planning.collisions.legs_check import (
     MovedShapes,
     along,
     approach,
@@ -16,10 +19,7 @@ from nmm.collisions.legs_check import (
     pair_bound,
     speed_towards,
 )
-from nmm.collisions.motion_check import MotionCheck
-from nmm.model.collisions.pairs import random_configurations
-from nmm.model.collisions.separation import CLOSE
-from nmm.model.robots.zero_order_hold import HeldInputs
+from nmm.plugins.planning.collisions.motion_check import MotionCheck
 
 SHAPES = {
     "box": (nmm.Box([0.3, 0.8, 1.0]), [1.6, 0.2, 0.5, 0.2, 0.1, 0.4]),

@@ -6,11 +6,11 @@ import pytest
 import nmm
 from nmm.model.robots.wheel_rates import turning_wheels
 from nmm.model.robots.zero_order_hold import inputs_of
-from nmm.plans.plan import Asked
-from nmm.plans.samples import flow
-from nmm.plans.search import Search
-from nmm.plans.search_space import USUAL
-from nmm.plans.smoothing import Smoothing
+from nmm.plugins.planning.plan import Asked
+from nmm.plugins.planning.samples import flow
+from nmm.plugins.planning.search import Search
+from nmm.plugins.planning.search_space import USUAL
+from nmm.plugins.planning.smoothing import Smoothing
 
 LIMITS = nmm.Limits(velocity={"platform": 1.0, "arm": 1.5}, acceleration={"platform": 1.0, "arm": 3.0})
 WALL = nmm.Obstacle(nmm.Box([0.2, 4.0, 2.0]), [3.0, 0.0, 0.5], name="wall")

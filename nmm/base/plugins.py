@@ -23,7 +23,7 @@ from nmm.base.text_format import one_line
 GROUP = "nmm.plugins"
 #: The description of each shipped plugin.
 SHIPPED = (
-    "nmm.plans.plugin:PLUGIN",
+    "nmm.plugins.planning.plugin:PLUGIN",
     "nmm.analysis.formulas.plugin:PLUGIN",
     "nmm.driving.plugin:PLUGIN",
     "nmm.ros.plugin:PLUGIN",

@@ -23,8 +23,8 @@ from nmm.driving.driven import Driven
 from nmm.driving.setups import led_by
 from nmm.model.robots.frame_path import FramePath
 from nmm.model.robots.motion import Motion
-from nmm.plans.plan import Plan
-from nmm.plans.planned import plan
+from nmm.plugins.planning.plan import Plan
+from nmm.plugins.planning.planned import plan
 from nmm.views.playback.drawing import Command, packed
 from nmm.views.playback.keyframes import ghost_samples
 from nmm.views.playback.shapes import DrawnRobot

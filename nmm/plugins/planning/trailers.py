@@ -4,7 +4,7 @@ No words are known for trailers. The tractor's words of arcs and lines (Dubins) 
 angles are integrated along. Driven forwards they settle; backwards they run away. A way backwards to a goal
 is therefore one that is driven forwards from it, reversed in time, as q̇ = S(q) u may be. The trees join where
 a word leads from a node of one to the tractor's pose of a node of the other and the hitches' angles differ
-little. What differs there, and rests at cusps, `nmm.plans.smoothing` takes away.
+little. What differs there, and rests at cusps, `nmm.plugins.planning.smoothing` takes away.
 """
 
 import math
@@ -27,11 +27,11 @@ from nmm.base.kernels.record_layout import (
     Vector,
     views,
 )
-from nmm.collisions.legs_check import MovedShapes, too_near
 from nmm.model.robots.zero_order_hold import Inputs
-from nmm.plans.samples import flow
-from nmm.plans.tree import draw
-from nmm.plans.words import PARTS, STRAIGHT, dubins, wrapped
+from nmm.plugins.planning.collisions.legs_check import MovedShapes, too_near
+from nmm.plugins.planning.samples import flow
+from nmm.plugins.planning.tree import draw
+from nmm.plugins.planning.words import PARTS, STRAIGHT, dubins, wrapped
 
 #: A motion has the three parts of a word of Dubins, and a straight line after them.
 DRIVEN = 4

@@ -12,7 +12,7 @@ from nmm.control.limits.limits import LimitsOn
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.collisions.shapes import HalfSpace
 from nmm.model.robots.robot import Robot
-from nmm.plans.goals import Wanted, alternatives
+from nmm.plugins.planning.goals import Wanted, alternatives
 
 #: Speeds where inputs have no limits, m/s and rad/s; the stop between legs where accelerations have none, s.
 USUAL, PAUSE = 1.0, 0.2

@@ -19,7 +19,7 @@ from nmm.scenario.sections import Making, Section
 from nmm.scenario.tasks import build_tasks
 
 if TYPE_CHECKING:
-    from nmm.plans.plan import Plan
+    from nmm.plugins.planning.plan import Plan
 
 
 def _goal(value: object) -> dict[str, Any]:
@@ -108,7 +108,7 @@ class PlanSection(Section):
 
     def tasks(self, making: Making, tasks: list[Task]) -> list[Task]:
         """The plan that is followed, in place of the file's tasks."""
-        from nmm.plans.replan import replan
+        from nmm.plugins.planning.replan import replan
 
         if self.track is None:
             return tasks
@@ -124,7 +124,7 @@ class PlanSection(Section):
 
     def motion(self, making: Making) -> Plan:
         """The planned motion; `RunError` where none is found."""
-        from nmm.plans.planned import plan
+        from nmm.plugins.planning.planned import plan
 
         robot, parts = making.robot, making.parts
         for k, coordinates in enumerate([self.to, *self.through]):

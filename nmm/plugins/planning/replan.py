@@ -14,10 +14,10 @@ from nmm.base.arrays import Array, counted, positive, scalar
 from nmm.base.errors import InputError, expect_kind
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.platforms.tractor import Tractor
-from nmm.plans.following import differences
-from nmm.plans.plan import Plan
-from nmm.plans.planned import finished
-from nmm.plans.search import STEP, Search
+from nmm.plugins.planning.following import differences
+from nmm.plugins.planning.plan import Plan
+from nmm.plugins.planning.planned import finished
+from nmm.plugins.planning.search import STEP, Search
 
 #: Times at which the plan's nearest point is looked for, s apart.
 NEAR = 0.05

@@ -22,18 +22,18 @@ from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.collisions.scene import Scene
 from nmm.model.platforms.tractor import Tractor
 from nmm.model.robots.robot import Robot
-from nmm.plans.goals import Wanted, alternatives
-from nmm.plans.held_motion import HeldTiming
-from nmm.plans.held_search import HeldWays, refuse_beside_hold
-from nmm.plans.holding import Held
-from nmm.plans.plan import Asked, Found, Motion, Plan
-from nmm.plans.samples import SampledMotion, joined
-from nmm.plans.search import Search
-from nmm.plans.search_space import USUAL
-from nmm.plans.smoothing import Smoothing
-from nmm.plans.timing import TimedLegs, timed
-from nmm.plans.towing import Towing
-from nmm.plans.waiting import LONG, waited
+from nmm.plugins.planning.goals import Wanted, alternatives
+from nmm.plugins.planning.held_motion import HeldTiming
+from nmm.plugins.planning.held_search import HeldWays, refuse_beside_hold
+from nmm.plugins.planning.holding import Held
+from nmm.plugins.planning.plan import Asked, Found, Motion, Plan
+from nmm.plugins.planning.samples import SampledMotion, joined
+from nmm.plugins.planning.search import Search
+from nmm.plugins.planning.search_space import USUAL
+from nmm.plugins.planning.smoothing import Smoothing
+from nmm.plugins.planning.timing import TimedLegs, timed
+from nmm.plugins.planning.towing import Towing
+from nmm.plugins.planning.waiting import LONG, waited
 
 #: Ways that are tried among obstacles that move, and how often each but the first is shortened.
 WAYS, SHORTEN = 8, 50

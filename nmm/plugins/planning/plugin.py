@@ -4,8 +4,8 @@ from nmm.base.plugins import Plugin
 
 PLUGIN = Plugin(
     "planning",
-    kinds={"task": {"parking": "nmm.plans.parking:Parking"}},
-    commands={"plan": "nmm.cli.planning:plan"},
+    kinds={"task": {"parking": "nmm.plugins.planning.parking:Parking"}},
+    commands={"plan": "nmm.plugins.planning.cli:plan"},
     after={"plan": "compare"},
-    sections={"plan": "nmm.plans.section:PlanSection"},
+    sections={"plan": "nmm.plugins.planning.section:PlanSection"},
 )

@@ -11,7 +11,7 @@ from nmm.base.arrays import Array, Integers
 from nmm.control.limits.limits import LimitsOn
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.wheel_rates import turning_wheels
-from nmm.plans.path import Guide
+from nmm.plugins.planning.path import Guide
 
 
 @dataclass(frozen=True)

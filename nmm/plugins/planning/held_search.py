@@ -16,16 +16,16 @@ import numpy as np
 
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError, RunError
-from nmm.collisions.legs_check import MARGIN
 from nmm.model.platforms.tractor import Tractor
 from nmm.model.robots.robot import Robot
-from nmm.plans.goals import ATTEMPTS, GoalPostures, Wanted, alternatives, nothing_found
-from nmm.plans.held_motion import ROUND, HeldTiming
-from nmm.plans.holding import ARRIVED, BLOCKED, LOST, Held
-from nmm.plans.path import shortened
-from nmm.plans.plan import Asked
-from nmm.plans.samples import SampledMotion
-from nmm.plans.tree import Trees
+from nmm.plugins.planning.collisions.legs_check import MARGIN
+from nmm.plugins.planning.goals import ATTEMPTS, GoalPostures, Wanted, alternatives, nothing_found
+from nmm.plugins.planning.held_motion import ROUND, HeldTiming
+from nmm.plugins.planning.holding import ARRIVED, BLOCKED, LOST, Held
+from nmm.plugins.planning.path import shortened
+from nmm.plugins.planning.plan import Asked
+from nmm.plugins.planning.samples import SampledMotion
+from nmm.plugins.planning.tree import Trees
 
 #: The steps by which the arm follows while a way is looked for, s, and of its joints, rad or m.
 TICK, FAR = 0.1, 0.04

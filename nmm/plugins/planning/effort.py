@@ -12,8 +12,8 @@ from nmm.base.arrays import Array
 from nmm.base.errors import InputError, RunError
 from nmm.model.dynamics.dynamics import Dynamics
 from nmm.model.robots.robot import Robot
-from nmm.plans.samples import SampledMotion
-from nmm.plans.timing import TimedLegs
+from nmm.plugins.planning.samples import SampledMotion
+from nmm.plugins.planning.timing import TimedLegs
 
 #: Places at which torques are looked at, of a leg and of a sample; between them they may rise by the rest of
 #: their limits.

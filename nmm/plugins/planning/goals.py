@@ -17,12 +17,12 @@ from nmm.base.kernels.compiled import checked_by_caller, compiled, scratch
 from nmm.base.kernels.linear_algebra import dot, eliminate
 from nmm.base.kernels.record_layout import BLOCKS, IntegerCell, IntegerVector, Matrix, Vector, views
 from nmm.base.kernels.velocity_map import place_mimic_joints
-from nmm.collisions.motion_check import MotionCheck
 from nmm.control.functions.program import BESIDE, COMPILED, LaidOut, Program, run_program
 from nmm.control.functions.tasks.linear_coordinates import Posture
 from nmm.control.functions.tasks.task import Comparison, Task
 from nmm.control.goal import ANOTHER, Goal, norms, unit_codes
 from nmm.model.robots.robot import Robot
+from nmm.plugins.planning.collisions.motion_check import MotionCheck
 
 #: A configuration, coordinates by name, a task with a target that stands, or several of these.
 Wanted: TypeAlias = (

@@ -13,14 +13,14 @@ import math
 import numpy as np
 
 from nmm.base.arrays import Array, Integers
-from nmm.collisions.legs_check import MARGIN
 from nmm.control.limits.limits import LimitsOn
 from nmm.model.robots.zero_order_hold import inputs_of
-from nmm.plans.holding import ARRIVED, Followed, Held
-from nmm.plans.path import Guide
-from nmm.plans.problem import TURN
-from nmm.plans.samples import SampledMotion, Samples
-from nmm.plans.timing import inputs_of_leg, spins_of
+from nmm.plugins.planning.collisions.legs_check import MARGIN
+from nmm.plugins.planning.holding import ARRIVED, Followed, Held
+from nmm.plugins.planning.path import Guide
+from nmm.plugins.planning.problem import TURN
+from nmm.plugins.planning.samples import SampledMotion, Samples
+from nmm.plugins.planning.timing import inputs_of_leg, spins_of
 
 #: The steps by which the arm follows, s, and its joints', rad or m, halved until what is held is off by no
 #: more than KEPT, m and rad, between nodes.

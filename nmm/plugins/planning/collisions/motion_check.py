@@ -10,12 +10,12 @@ from numba import types
 from nmm.base.arrays import Array, Integers
 from nmm.base.kernels.compiled import checked_by_caller, compiled
 from nmm.base.kernels.record_layout import BLOCKS, Blocks, Memory, views
-from nmm.collisions.legs_check import MARGIN, MovedShapes, first_blocked, too_near
 from nmm.model.collisions.queries import Queries
 from nmm.model.collisions.scene import Scene
 from nmm.model.collisions.separation import ConvexShapes
 from nmm.model.robots.joint_table import as_row
 from nmm.model.robots.robot import Robot
+from nmm.plugins.planning.collisions.legs_check import MARGIN, MovedShapes, first_blocked, too_near
 
 #: The direction that separates a pair before the first look.
 UP = (0.0, 0.0, 1.0)
@@ -32,7 +32,7 @@ _BLOCKED = types.int64(*BLOCKS.types, _FLAT, types.float64[:, ::1], types.int64,
 
 
 class MotionCheck:
-    """Looks at configurations and legs (`nmm.collisions.legs_check`) of a robot at t = 0, s.
+    """Looks at configurations and legs (`nmm.plugins.planning.collisions.legs_check`) of a robot at t = 0, s.
 
     Parameters
     ----------

@@ -3,7 +3,7 @@
 J. J. Kuffner, S. M. LaValle, RRT-Connect: an efficient approach to single-query path planning, ICRA 2000. The
 tree from the start and the one from the goals take turns: one grows a step towards a random configuration,
 the other then as far as it can towards the new one. Motions between configurations are the platform's ways
-(`nmm.plans.ways`).
+(`nmm.plugins.planning.ways`).
 
 OMPL has this search, too. Its Python interface (2.0.1) hides the parts of its words, so that compiled code
 cannot look at a motion. Reading a state and the length of a word takes 14 µs from Python; a compiled look at
@@ -29,8 +29,8 @@ from nmm.base.kernels.record_layout import (
     views,
 )
 from nmm.base.kernels.velocity_map import place_mimic_joints
-from nmm.collisions.legs_check import MovedShapes, along, first_blocked, too_near
-from nmm.plans.ways import Ways, find_way, least_time, leg_time, way_time
+from nmm.plugins.planning.collisions.legs_check import MovedShapes, along, first_blocked, too_near
+from nmm.plugins.planning.ways import Ways, find_way, least_time, leg_time, way_time
 
 #: Of random configurations, the share whose arm is between those of a start and a goal.
 BETWEEN = 0.5

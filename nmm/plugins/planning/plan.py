@@ -19,11 +19,11 @@ from nmm.control.limits.limits import Limits, LimitsOn
 from nmm.model.collisions.scene import Scene
 from nmm.model.robots.robot import Robot
 from nmm.motion.trajectory import Trajectory
-from nmm.plans.following import FromPlan
-from nmm.plans.goals import Wanted, goal_task
-from nmm.plans.objective import SampleCosts
-from nmm.plans.recorded import recorded
-from nmm.plans.samples import SampledMotion
+from nmm.plugins.planning.following import FromPlan
+from nmm.plugins.planning.goals import Wanted, goal_task
+from nmm.plugins.planning.objective import SampleCosts
+from nmm.plugins.planning.recorded import recorded
+from nmm.plugins.planning.samples import SampledMotion
 
 
 class Motion(Protocol):

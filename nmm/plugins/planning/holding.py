@@ -18,17 +18,17 @@ from nmm.base.errors import InputError, expect_kind
 from nmm.base.kernels.compiled import checked_by_caller, compiled, compiled_without_gil, scratch
 from nmm.base.kernels.linear_algebra import copied
 from nmm.base.kernels.record_layout import BLOCKS, views
-from nmm.collisions.legs_check import MovedShapes, along, leg_blocked, too_near
-from nmm.collisions.motion_check import MotionCheck
 from nmm.control.functions.program import BESIDE, evaluate
 from nmm.control.functions.tasks.pose import Pose
 from nmm.control.functions.tasks.task import Task
 from nmm.control.goal import Goal, norms, unit_codes
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
-from nmm.plans.goals import STEPS, Newton, TaskError, newton_step
-from nmm.plans.tree import PLACE, Trees
-from nmm.plans.ways import leg_time
+from nmm.plugins.planning.collisions.legs_check import MovedShapes, along, leg_blocked, too_near
+from nmm.plugins.planning.collisions.motion_check import MotionCheck
+from nmm.plugins.planning.goals import STEPS, Newton, TaskError, newton_step
+from nmm.plugins.planning.tree import PLACE, Trees
+from nmm.plugins.planning.ways import leg_time
 
 #: Where what is held is off by no more, it is kept: m and rad.
 EXACT = 1e-10

@@ -12,8 +12,8 @@ from nmm.base.kernels.compiled import compiled, kernel, scratch
 from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.control.functions.function import Function, Row, Stage
 from nmm.model.robots.robot import Robot
-from nmm.plans.ways import ROLLS, Ways, ways_of
-from nmm.plans.words import PARTS, reeds_shepp, wrapped
+from nmm.plugins.planning.ways import ROLLS, Ways, ways_of
+from nmm.plugins.planning.words import PARTS, reeds_shepp, wrapped
 
 #: Where numbers begin: whether memory stands, the goal, the frame that rolls, what is near enough, ...
 STANDS, GOAL, ROLLING, WITHIN = 0, 1, 4, 7

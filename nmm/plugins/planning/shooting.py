@@ -1,7 +1,7 @@
 """Motions of samples within all limits, as a problem of multiple shooting, compiled: what it asks for.
 
 The unknowns are q and u at the samples' ends and the constant rate a = du/dt within each; gaps between the
-samples close while it is solved (`nmm.plans.interior`).
+samples close while it is solved (`nmm.plugins.planning.interior`).
 """
 
 import math
@@ -22,7 +22,9 @@ from nmm.base.kernels.record_layout import (
     Vector,
     views,
 )
-from nmm.collisions.legs_check import (
+from nmm.model.robots.wheel_rates import rolling
+from nmm.model.robots.zero_order_hold import Inputs
+from nmm.plugins.planning.collisions.legs_check import (
     MovedShapes,
     begin_motion,
     look,
@@ -30,9 +32,7 @@ from nmm.collisions.legs_check import (
     placed_bound,
     write_approach,
 )
-from nmm.model.robots.wheel_rates import rolling
-from nmm.model.robots.zero_order_hold import Inputs
-from nmm.plans.samples import flow, write_fastest
+from nmm.plugins.planning.samples import flow, write_fastest
 
 #: Distances are looked at within this beyond those to keep, m.
 NEAR = 0.08

@@ -12,7 +12,6 @@ from nmm.base.errors import InputError, expect_kind
 from nmm.base.findings import Finding
 from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.record_layout import Memory, views
-from nmm.collisions.motion_check import MotionCheck
 from nmm.control.functions.tasks.task import Task
 from nmm.control.goal import Goal, error_sizes
 from nmm.control.limits.collisions import Collisions
@@ -22,14 +21,15 @@ from nmm.model.robots.joint_table import as_row
 from nmm.model.robots.robot import Robot
 from nmm.motion.trajectory import Outcome, Trajectory
 from nmm.motion.verdict import Verdict
-from nmm.plans.following import differences
-from nmm.plans.goals import TaskError, goal_task
-from nmm.plans.interior import SHOOT, shoot
-from nmm.plans.plan import Plan
-from nmm.plans.problem import END, MARGIN, largest_inputs, shooting_problem
-from nmm.plans.recorded import recorded
-from nmm.plans.samples import SampledMotion, Samples
-from nmm.plans.shooting import LOOK, Shooting, first_blocked_sample
+from nmm.plugins.planning.collisions.motion_check import MotionCheck
+from nmm.plugins.planning.following import differences
+from nmm.plugins.planning.goals import TaskError, goal_task
+from nmm.plugins.planning.interior import SHOOT, shoot
+from nmm.plugins.planning.plan import Plan
+from nmm.plugins.planning.problem import END, MARGIN, largest_inputs, shooting_problem
+from nmm.plugins.planning.recorded import recorded
+from nmm.plugins.planning.samples import SampledMotion, Samples
+from nmm.plugins.planning.shooting import LOOK, Shooting, first_blocked_sample
 
 #: Speeds of inputs without limits, m/s and rad/s.
 USUAL = 1.0

@@ -11,15 +11,15 @@ import numpy as np
 from nmm.base.arrays import Array
 from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.record_layout import Memory, views
-from nmm.collisions.motion_check import MotionCheck
 from nmm.control.limits.limits import LimitsOn
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.wheel_rates import turning_wheels
-from nmm.plans.interior import SHOOT, shoot
-from nmm.plans.objective import SampleCosts
-from nmm.plans.problem import MU, largest_inputs, shooting_problem, steps_within
-from nmm.plans.samples import SampledMotion, Samples
-from nmm.plans.shooting import LOOK, Shooting, first_blocked_sample
+from nmm.plugins.planning.collisions.motion_check import MotionCheck
+from nmm.plugins.planning.interior import SHOOT, shoot
+from nmm.plugins.planning.objective import SampleCosts
+from nmm.plugins.planning.problem import MU, largest_inputs, shooting_problem, steps_within
+from nmm.plugins.planning.samples import SampledMotion, Samples
+from nmm.plugins.planning.shooting import LOOK, Shooting, first_blocked_sample
 
 #: How many samples a motion has: one for each so many seconds of the path's time, within limits.
 EACH, FEWEST, MOST = 0.27, 24, 80

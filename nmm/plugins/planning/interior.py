@@ -14,8 +14,8 @@ from numba import types
 from nmm.base.arrays import Array, Integers
 from nmm.base.kernels.compiled import clear, compiled, compiled_without_gil, scratch
 from nmm.base.kernels.record_layout import BLOCKS, views
-from nmm.collisions.legs_check import MovedShapes
-from nmm.plans.shooting import Shooting, write_all
+from nmm.plugins.planning.collisions.legs_check import MovedShapes
+from nmm.plugins.planning.shooting import Shooting, write_all
 
 #: The longest step of a round, m and rad.
 STEP = 0.3

@@ -17,13 +17,13 @@ import numpy as np
 
 from nmm.base.arrays import Array
 from nmm.base.kernels.record_layout import views
-from nmm.collisions.legs_check import MovedShapes
-from nmm.collisions.motion_check import MotionCheck
 from nmm.model.collisions.obstacle import shifts
 from nmm.model.collisions.scene import Scene
 from nmm.model.robots.joint_table import as_row
 from nmm.model.robots.robot import Robot
-from nmm.plans.timing import TimedLegs
+from nmm.plugins.planning.collisions.legs_check import MovedShapes
+from nmm.plugins.planning.collisions.motion_check import MotionCheck
+from nmm.plugins.planning.timing import TimedLegs
 
 #: Interval of time, s, and parts of it that are looked at alone where need be.
 STEP, PARTS = 0.1, 4

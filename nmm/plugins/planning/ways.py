@@ -12,10 +12,10 @@ from nmm.base.kernels.record_layout import Cell, IntegerCell, IntegerVector, Vec
 from nmm.model.platforms.steering import SteeredAxle, SteeringPivot
 from nmm.model.platforms.tractor import Tractor
 from nmm.model.robots.robot import Robot
-from nmm.plans.words import PARTS, dubins, reeds_shepp, wrapped
+from nmm.plugins.planning.words import PARTS, dubins, reeds_shepp, wrapped
 
 #: What a platform does: it stands, moves every way, rolls one way, to and fro or only forwards, or tows
-#: trailers, whose ways are not legs (`nmm.plans.towing`).
+#: trailers, whose ways are not legs (`nmm.plugins.planning.towing`).
 STANDS, SLIDES, ROLLS, FORWARDS, TOWS = 0, 1, 2, 3, 4
 #: Legs of one way at most: the parts of a word, and the steering before and after each.
 LEGS = 2 * PARTS + 1

@@ -8,12 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from nmm.base.arrays import Array
-from nmm.collisions.motion_check import MotionCheck
 from nmm.control.limits.limits import LimitsOn
 from nmm.model.platforms.tractor import Tractor
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.zero_order_hold import inputs_of
-from nmm.plans.shooting import Shooting
+from nmm.plugins.planning.collisions.motion_check import MotionCheck
+from nmm.plugins.planning.shooting import Shooting
 
 #: Samples' ends keep this much more than the distance, m.
 MARGIN = 0.005

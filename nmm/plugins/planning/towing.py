@@ -13,16 +13,16 @@ from nmm.base.arrays import Array
 from nmm.base.errors import RunError
 from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.record_layout import Memory, views
-from nmm.collisions.motion_check import MotionCheck
 from nmm.control.limits.limits import LimitsOn
 from nmm.model.platforms.tractor import Tractor
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.zero_order_hold import inputs_of
-from nmm.plans.objective import SampleCosts
-from nmm.plans.samples import SampledMotion
-from nmm.plans.smoothing import Smoothing
-from nmm.plans.trailers import DRIVEN, SEARCH, SPACING, TRACE, Trains, search_trains, trace
-from nmm.plans.tree import MODULUS
+from nmm.plugins.planning.collisions.motion_check import MotionCheck
+from nmm.plugins.planning.objective import SampleCosts
+from nmm.plugins.planning.samples import SampledMotion
+from nmm.plugins.planning.smoothing import Smoothing
+from nmm.plugins.planning.trailers import DRIVEN, SEARCH, SPACING, TRACE, Trains, search_trains, trace
+from nmm.plugins.planning.tree import MODULUS
 
 #: Room for configurations in each tree; rounds between two looks at the clock. Once the trees have joined
 #: they grow on for so many rounds, for a shorter way.

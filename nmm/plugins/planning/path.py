@@ -10,9 +10,9 @@ from numba import types
 from nmm.base.arrays import Array
 from nmm.base.kernels.compiled import checked_by_caller, compiled
 from nmm.base.kernels.record_layout import BLOCKS, Blocks, views
-from nmm.collisions.legs_check import along
-from nmm.plans.tree import PLACE, Trees
-from nmm.plans.ways import LEGS, find_way, leg_time
+from nmm.plugins.planning.collisions.legs_check import along
+from nmm.plugins.planning.tree import PLACE, Trees
+from nmm.plugins.planning.ways import LEGS, find_way, leg_time
 
 #: A shorter way saves at least this, s.
 WORTH = 1e-3

@@ -9,7 +9,7 @@ from nmm.base.errors import InputError, expect_kind
 from nmm.control.functions.objectives.base import Objective
 from nmm.control.functions.program import COMPILED, Program, run_program
 from nmm.model.robots.robot import Robot
-from nmm.plans.shooting import Shooting
+from nmm.plugins.planning.shooting import Shooting
 
 #: Between the gradients whose difference is the curvature, m and rad.
 APART = 1e-5

@@ -16,18 +16,18 @@ from nmm.base.arrays import Array, counted
 from nmm.base.errors import InputError, RunError, few
 from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.record_layout import views
-from nmm.collisions.legs_check import MARGIN
-from nmm.collisions.motion_check import MotionCheck
 from nmm.model.robots.robot import Robot
-from nmm.plans import tree
-from nmm.plans.effort import efforts_of
-from nmm.plans.goals import GoalPostures, Wanted, alternatives, nothing_found
-from nmm.plans.objective import SampleCosts
-from nmm.plans.path import Guide, shortened
-from nmm.plans.plan import Asked
-from nmm.plans.search_space import drawn_within, leg_speeds, pause_between, usual_speeds
-from nmm.plans.tree import PLACE, Trees
-from nmm.plans.ways import LEGS, ways_of
+from nmm.plugins.planning import tree
+from nmm.plugins.planning.collisions.legs_check import MARGIN
+from nmm.plugins.planning.collisions.motion_check import MotionCheck
+from nmm.plugins.planning.effort import efforts_of
+from nmm.plugins.planning.goals import GoalPostures, Wanted, alternatives, nothing_found
+from nmm.plugins.planning.objective import SampleCosts
+from nmm.plugins.planning.path import Guide, shortened
+from nmm.plugins.planning.plan import Asked
+from nmm.plugins.planning.search_space import drawn_within, leg_speeds, pause_between, usual_speeds
+from nmm.plugins.planning.tree import PLACE, Trees
+from nmm.plugins.planning.ways import LEGS, ways_of
 
 #: Room for configurations in each tree, and rounds of a search between two looks at the clock.
 ROOM, ROUNDS = 20_000, 200

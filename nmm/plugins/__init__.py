@@ -1,0 +1,1 @@
+"""What stands above the core, which knows none of it: planning, symbolic, live, robot, sweeps."""

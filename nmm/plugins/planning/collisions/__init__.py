@@ -1,0 +1,1 @@
+"""Whether whole motions keep their distances."""
