@@ -12,7 +12,6 @@ import twin
 from numpy.typing import NDArray
 from paper_cases import CIRCLE
 
-from nmm.analysis.formulas import SymbolicAnalysis, symbolic
 from nmm.analysis.singular.jacobians import Jacobians, stacked
 from nmm.control.functions.program import evaluate
 from nmm.control.functions.references import Bearing
@@ -20,6 +19,7 @@ from nmm.control.functions.tasks import Heading, Position, Task
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot
+from nmm.plugins.symbolic import SymbolicAnalysis, symbolic
 
 Array = NDArray[np.float64]
 

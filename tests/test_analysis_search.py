@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from urdf_parts import AXIS, joint, link, robot, write
 
 from nmm.analysis import analyse
-from nmm.analysis.search.family import SingularFamily
-from nmm.analysis.search.many_starts import SingularitySearch, find_singularities
-from nmm.analysis.search.nearest import nearest_singularity
 from nmm.base.errors import InputError, SingularError
 from nmm.control.functions.tasks import CallableFunction, Heading, Pose, Position, Posture
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot
+from nmm.plugins.symbolic.search.family import SingularFamily
+from nmm.plugins.symbolic.search.many_starts import SingularitySearch, find_singularities
+from nmm.plugins.symbolic.search.nearest import nearest_singularity
 from nmm.scenario import Scenario
 
 Array = NDArray[np.float64]

@@ -10,15 +10,15 @@ import twin
 from numpy import pi
 from numpy.typing import NDArray
 
-from nmm.analysis.search.family import values_text
-from nmm.analysis.search.many_starts import find_singularities
-from nmm.analysis.search.nearest import nearest_singularity
 from nmm.base.text_format import value_text
-from nmm.cli.singularity_options import search_command, show_nearest, show_search
 from nmm.cli.subjects import studied
 from nmm.control.functions.tasks import CallableFunction, Position
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot
+from nmm.plugins.symbolic.options import search_command, show_nearest, show_search
+from nmm.plugins.symbolic.search.family import values_text
+from nmm.plugins.symbolic.search.many_starts import find_singularities
+from nmm.plugins.symbolic.search.nearest import nearest_singularity
 
 Array = NDArray[np.float64]
 

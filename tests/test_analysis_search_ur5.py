@@ -13,12 +13,12 @@ from scipy.optimize import minimize
 from spatial_arms import load_ur5
 
 from nmm.analysis import analyse
-from nmm.analysis.search.family import SingularFamily
-from nmm.analysis.search.many_starts import SingularitySearch, find_singularities
-from nmm.analysis.search.nearest import nearest_singularity
 from nmm.control.functions.tasks import Pose
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot
+from nmm.plugins.symbolic.search.family import SingularFamily
+from nmm.plugins.symbolic.search.many_starts import SingularitySearch, find_singularities
+from nmm.plugins.symbolic.search.nearest import nearest_singularity
 
 Array = NDArray[np.float64]
 

@@ -12,13 +12,13 @@ import sympy
 import twin
 from symbolic_checks import PAPER, TASKS, TIP, check_numbers, made, minors_of
 
-from nmm.analysis.formulas import symbolic
-from nmm.analysis.formulas.expressions import shown
-from nmm.analysis.formulas.symbolic_analysis import latex_lines
 from nmm.base.errors import InputError
 from nmm.control.functions.tasks import Distance, Orientation, Pointing, Position
 from nmm.model.platforms import DifferentialDrive
 from nmm.model.robots.loading import load
+from nmm.plugins.symbolic import symbolic
+from nmm.plugins.symbolic.expressions import shown
+from nmm.plugins.symbolic.symbolic_analysis import latex_lines
 
 ARGUMENTS = [None, {"d": -0.2, "h": 0.4, "l1": 0.35, "l2": 0.35}, {"d": 0}]
 

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from paper_cases import CASES, H1, TIP, Case
 from symbolic_checks import check_numbers
 
-from nmm.analysis.formulas import symbolic
 from nmm.base.errors import InputError
 from nmm.base.kernels.compiled import PLATFORM, Kernel, kernel
 from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
@@ -41,6 +40,7 @@ from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
 from nmm.motion.simulation import simulate
 from nmm.motion.trajectory import Trajectory
+from nmm.plugins.symbolic import symbolic
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from findings import refused, the
 from symbolic_checks import check_numbers
 
 import nmm
-from nmm.analysis.formulas import symbolic
+from nmm.plugins.symbolic import symbolic
 
 ROBOT = nmm.load("unicycle_pan_tilt")
 BALL = [2.0, 0.5, 0.6]

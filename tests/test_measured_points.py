@@ -11,8 +11,8 @@ from findings import refused, the
 from scipy.linalg import expm, solve_discrete_are
 
 import nmm
-from nmm.analysis.formulas import symbolic
 from nmm.control.functions.tasks.depth_estimate import MotionEstimate
+from nmm.plugins.symbolic import symbolic
 
 ROBOT = nmm.load("unicycle_pan_tilt")
 CAMERA = "camera_optical_frame"

@@ -17,12 +17,9 @@ from short_scenario import scenario
 from urdf_parts import inertial, joint, link, robot, write
 
 import nmm
-from nmm.analysis.formulas import symbolic
 from nmm.analysis.maps.coordinates import singularity_map
 from nmm.analysis.maps.workspace import workspace_map
 from nmm.analysis.redundancy import redundancy
-from nmm.analysis.search.many_starts import find_singularities
-from nmm.analysis.search.nearest import nearest_singularity
 from nmm.analysis.singular.jacobians import Jacobians
 from nmm.analysis.singular.singularity import analyse
 from nmm.base.errors import InputError, RobotError
@@ -32,6 +29,9 @@ from nmm.model.robots.loading.packages import package_file
 from nmm.model.robots.mimic_joints import MimicJoint
 from nmm.model.robots.robot import Robot
 from nmm.playback.viewer import viewer_scene
+from nmm.plugins.symbolic import symbolic
+from nmm.plugins.symbolic.search.many_starts import find_singularities
+from nmm.plugins.symbolic.search.nearest import nearest_singularity
 
 Array = NDArray[np.float64]
 

@@ -29,13 +29,13 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from symbolic_checks import PAPER, TASKS, made
 
-from nmm.analysis.formulas import SymbolicAnalysis, lower_bound, never_zero, singular_set, symbolic, vanishing
-from nmm.analysis.formulas.zeros import Basis, Limits, Undecided, Zeros
 from nmm.base.errors import InputError
 from nmm.base.findings import Finding
 from nmm.control.functions.tasks import Heading, LinearCoordinates, Position
 from nmm.model.platforms import Omnidirectional
 from nmm.model.robots.loading import load
+from nmm.plugins.symbolic import SymbolicAnalysis, lower_bound, never_zero, singular_set, symbolic, vanishing
+from nmm.plugins.symbolic.zeros import Basis, Limits, Undecided, Zeros
 
 Array = NDArray[np.float64]
 
@@ -239,8 +239,8 @@ def test_what_the_statements_leave_out() -> None:
 
 
 def test_what_is_not_decided_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nmm.analysis.formulas.zeros._SET", Limits(2, 5, 100))
-    monkeypatch.setattr("nmm.analysis.formulas.claims._BRIEF", Limits(2, 5, 100))
+    monkeypatch.setattr("nmm.plugins.symbolic.zeros._SET", Limits(2, 5, 100))
+    monkeypatch.setattr("nmm.plugins.symbolic.claims._BRIEF", Limits(2, 5, 100))
     claim = singular_set(made("unicycle_3r", "spatial position")[2])
     assert not claim.proved
     assert claim.statement == Finding("rank_undecided")

@@ -13,12 +13,6 @@ from urdf_parts import LIMIT, inertial, joint, link, write
 from urdf_parts import robot as urdf
 
 import nmm
-from nmm.analysis.formulas import symbolic
-from nmm.analysis.formulas.derivation import traced_G
-from nmm.analysis.formulas.expansion import Ring
-from nmm.analysis.formulas.frames import Frames
-from nmm.analysis.formulas.geometry import Geometry
-from nmm.analysis.formulas.quotient import Quotient, quotient
 from nmm.base.errors import InputError
 from nmm.control.functions.references import Bearing, Circle, PoseReference
 from nmm.control.functions.tasks import (
@@ -36,6 +30,12 @@ from nmm.control.functions.tasks import (
 )
 from nmm.model.platforms import Platform
 from nmm.model.robots.robot import Robot
+from nmm.plugins.symbolic import symbolic
+from nmm.plugins.symbolic.derivation import traced_G
+from nmm.plugins.symbolic.expansion import Ring
+from nmm.plugins.symbolic.frames import Frames
+from nmm.plugins.symbolic.geometry import Geometry
+from nmm.plugins.symbolic.quotient import Quotient, quotient
 
 LEVEL = '<axis xyz="0 1 0"/>'
 #: Inputs of its own choice make it divide by square roots.

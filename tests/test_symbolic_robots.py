@@ -17,9 +17,9 @@ from urdf_parts import AXIS, LIMIT, inertial, joint, link, write
 from urdf_parts import robot as urdf
 
 import nmm
-from nmm.analysis.formulas import TooLarge, never_zero, singular_set, symbolic
 from nmm.base.findings import Finding
 from nmm.control.functions.tasks import CenterOfMass, Orientation, Pose, Position, Posture
+from nmm.plugins.symbolic import TooLarge, never_zero, singular_set, symbolic
 
 
 @pytest.mark.parametrize("seen_from", [None, "link2"])

@@ -1,3 +1,11 @@
+from nmm.plugins.symbolic.search.descent import LocalMinimum as LocalMinimum
+from nmm.plugins.symbolic.search.family import Relation as Relation
+from nmm.plugins.symbolic.search.family import SingularFamily as SingularFamily
+from nmm.plugins.symbolic.search.many_starts import SingularitySearch as SingularitySearch
+from nmm.plugins.symbolic.search.many_starts import find_singularities as find_singularities
+from nmm.plugins.symbolic.search.nearest import SingularPoint as SingularPoint
+from nmm.plugins.symbolic.search.nearest import nearest_singularity as nearest_singularity
+
 from .maps.coordinates import singularity_map as singularity_map
 from .maps.measures import Judged as Judged
 from .maps.result import About as About
@@ -12,13 +20,6 @@ from .redundancy import SelfMotion as SelfMotion
 from .redundancy import redundancy as redundancy
 from .redundancy import repeatability as repeatability
 from .redundancy import self_motion as self_motion
-from .search.descent import LocalMinimum as LocalMinimum
-from .search.family import Relation as Relation
-from .search.family import SingularFamily as SingularFamily
-from .search.many_starts import SingularitySearch as SingularitySearch
-from .search.many_starts import find_singularities as find_singularities
-from .search.nearest import SingularPoint as SingularPoint
-from .search.nearest import nearest_singularity as nearest_singularity
 from .singular.algorithmic import ExtendedSingularity as ExtendedSingularity
 from .singular.algorithmic import PartitionSingularities as PartitionSingularities
 from .singular.along import Crossing as Crossing

@@ -24,7 +24,7 @@ GROUP = "nmm.plugins"
 #: The description of each shipped plugin.
 SHIPPED = (
     "nmm.plugins.planning.plugin:PLUGIN",
-    "nmm.analysis.formulas.plugin:PLUGIN",
+    "nmm.plugins.symbolic.plugin:PLUGIN",
     "nmm.driving.plugin:PLUGIN",
     "nmm.ros.plugin:PLUGIN",
     "nmm.sweeps.plugin:PLUGIN",

@@ -6,16 +6,16 @@ from typing import Literal
 
 import numpy as np
 
-from nmm.analysis.formulas.derivation import derived
-from nmm.analysis.formulas.expansion import Ring
-from nmm.analysis.formulas.frames import steps_to
-from nmm.analysis.formulas.geometry import Geometry
-from nmm.analysis.formulas.symbolic_analysis import SymbolicAnalysis, assembled, too_large_explained
-from nmm.analysis.formulas.task_rows import frames_of
 from nmm.analysis.singular.jacobians import Jacobians, Tasks, stacked
 from nmm.base.errors import InputError, NmmError, SingularError, expect_known
 from nmm.control.functions.tasks.task import Stack
 from nmm.model.robots.robot import Robot
+from nmm.plugins.symbolic.derivation import derived
+from nmm.plugins.symbolic.expansion import Ring
+from nmm.plugins.symbolic.frames import steps_to
+from nmm.plugins.symbolic.geometry import Geometry
+from nmm.plugins.symbolic.symbolic_analysis import SymbolicAnalysis, assembled, too_large_explained
+from nmm.plugins.symbolic.task_rows import frames_of
 
 #: Products of terms that an analysis may take: some seconds.
 BUDGET = 200_000

@@ -6,12 +6,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from nmm.analysis.formulas.expansion import Expansion, exact
-from nmm.analysis.formulas.frames import Frames, lazy, steps_to, turns, unread
-from nmm.analysis.formulas.geometry import back, cross, dot, signed_axis, turned
-from nmm.analysis.formulas.quotient import Linear, Quotient, Untraceable, quotient
-from nmm.analysis.formulas.tracing import traced
-from nmm.analysis.formulas.written import Arc, Share, Turn, Value
 from nmm.analysis.singular.jacobians import Reached
 from nmm.base.errors import InputError
 from nmm.base.kernels import records
@@ -25,6 +19,12 @@ from nmm.control.functions.tasks.pointing import pointing
 from nmm.control.functions.tasks.pose import frame_pose, orientation_error, pose_error
 from nmm.control.functions.tasks.position import distance
 from nmm.model.robots.robot import CENTER_OF_MASS, Robot
+from nmm.plugins.symbolic.expansion import Expansion, exact
+from nmm.plugins.symbolic.frames import Frames, lazy, steps_to, turns, unread
+from nmm.plugins.symbolic.geometry import back, cross, dot, signed_axis, turned
+from nmm.plugins.symbolic.quotient import Linear, Quotient, Untraceable, quotient
+from nmm.plugins.symbolic.tracing import traced
+from nmm.plugins.symbolic.written import Arc, Share, Turn, Value
 
 #: For errors that are logarithms, the rows of the frame's velocity, linear over angular, that J has at 0.
 _COMPARED: dict[Any, range] = {orientation_error: range(3, 6), pose_error: range(6)}

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nmm.analysis.formulas.expansion import Expansion, Ring, exact
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError
 from nmm.base.findings import Finding
+from nmm.plugins.symbolic.expansion import Expansion, Ring, exact
 
 Vector = list[Expansion]
 

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from nmm.analysis.formulas.expansion import Expansion, Ring, exact
-from nmm.analysis.formulas.geometry import Geometry
 from nmm.base.errors import InputError
+from nmm.plugins.symbolic.expansion import Expansion, Ring, exact
+from nmm.plugins.symbolic.geometry import Geometry
 
 #: How far from a multiple of π/2 a fixed angle may be and still be one, rad.
 _SQUARE = 1e-9

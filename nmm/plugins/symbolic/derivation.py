@@ -8,18 +8,18 @@ from fractions import Fraction
 
 import numpy as np
 
-from nmm.analysis.formulas.expansion import Expansion, Ring, exact
-from nmm.analysis.formulas.frames import Frames
-from nmm.analysis.formulas.geometry import Geometry
-from nmm.analysis.formulas.quotient import Quotient, Untraceable, common_multiple, quotient
-from nmm.analysis.formulas.task_rows import TracedRow, task_rows
-from nmm.analysis.formulas.tracing import traced
-from nmm.analysis.formulas.written import Auxiliary, Value, value_without
 from nmm.base.errors import InputError, expect, expect_known
 from nmm.base.findings import Finding
 from nmm.control.functions.tasks.task import Stack
 from nmm.model.platforms.base import Platform
 from nmm.model.robots.robot import Robot
+from nmm.plugins.symbolic.expansion import Expansion, Ring, exact
+from nmm.plugins.symbolic.frames import Frames
+from nmm.plugins.symbolic.geometry import Geometry
+from nmm.plugins.symbolic.quotient import Quotient, Untraceable, common_multiple, quotient
+from nmm.plugins.symbolic.task_rows import TracedRow, task_rows
+from nmm.plugins.symbolic.tracing import traced
+from nmm.plugins.symbolic.written import Auxiliary, Value, value_without
 
 #: Most digits of a number in G; more, as of roots, are not readable.
 _READABLE = 20

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from nmm.analysis.formulas.expansion import Expansion, exact
-from nmm.analysis.formulas.frames import Frames
-from nmm.analysis.formulas.quotient import Linear, Quotient, Traced, Untraceable, quotient
-from nmm.analysis.formulas.written import Arc
+from nmm.plugins.symbolic.expansion import Expansion, exact
+from nmm.plugins.symbolic.frames import Frames
+from nmm.plugins.symbolic.quotient import Linear, Quotient, Traced, Untraceable, quotient
+from nmm.plugins.symbolic.written import Arc
 
 
 def traced(kernel: Any, frames: Frames) -> Callable[..., Any]:

@@ -8,10 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.analysis.search.descent import LocalMinimum, descend, followed, lowest
-from nmm.analysis.search.family import SingularFamily
-from nmm.analysis.search.sorting import everywhere, families_of
-from nmm.analysis.search.space import TOLERANCE, Measure, Search, search_space
 from nmm.analysis.singular.jacobians import Jacobians, Subject
 from nmm.analysis.singular.parts import WHOLE
 from nmm.base.arrays import Array, counted, scalar
@@ -19,6 +15,10 @@ from nmm.base.errors import SingularError
 from nmm.base.progress import Progress, between
 from nmm.base.text_format import counted as counted_text
 from nmm.base.text_format import listed, value_text
+from nmm.plugins.symbolic.search.descent import LocalMinimum, descend, followed, lowest
+from nmm.plugins.symbolic.search.family import SingularFamily
+from nmm.plugins.symbolic.search.sorting import everywhere, families_of
+from nmm.plugins.symbolic.search.space import TOLERANCE, Measure, Search, search_space
 
 #: Cheap samples for each start of the better half.
 SAMPLES = 20

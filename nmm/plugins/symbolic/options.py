@@ -12,9 +12,9 @@ from nmm.cli.options import flag, option
 from nmm.cli.output import OK, progress, show_table, show_text
 
 if TYPE_CHECKING:
-    from nmm.analysis.search.many_starts import SingularitySearch
-    from nmm.analysis.search.nearest import SingularPoint
     from nmm.cli.subjects import Studied
+    from nmm.plugins.symbolic.search.many_starts import SingularitySearch
+    from nmm.plugins.symbolic.search.nearest import SingularPoint
 
 #: From how many configurations a search starts.
 STARTS = 200
@@ -38,10 +38,10 @@ class FormulaOptions(OptionGroup):
     def answer(self, *subject: Any) -> int | None:
         """Show the formulas of a robot's task, with the minors that are named; None where there are none."""
         studied, minor = subject
-        from nmm.analysis.formulas import symbolic
         from nmm.analysis.singular.jacobians import Jacobians
         from nmm.cli.document import say
-        from nmm.cli.symbolic import show_formulas, show_latex
+        from nmm.plugins.symbolic import symbolic
+        from nmm.plugins.symbolic.cli import show_formulas, show_latex
 
         Jacobians(studied.subject)  # complains about what is wrong with the input, formulas or not
         try:
@@ -94,8 +94,8 @@ def search_command(
 ) -> None:
     """Search all singular configurations from so many starts, the nearest to the one studied, or both; print
     what was found. `options` : seed, part and length of `find_singularities`."""
-    from nmm.analysis.search.many_starts import find_singularities
-    from nmm.analysis.search.nearest import nearest_singularity
+    from nmm.plugins.symbolic.search.many_starts import find_singularities
+    from nmm.plugins.symbolic.search.nearest import nearest_singularity
 
     options["t"] = studied.t
     if starts is not None:

@@ -6,7 +6,9 @@ from typing import Any, NamedTuple
 
 import sympy
 
-from nmm.analysis.formulas.expressions import (
+from nmm.base.findings import Finding
+from nmm.base.latex import Formula
+from nmm.plugins.symbolic.expressions import (
     Product,
     Symbol,
     Trig,
@@ -16,11 +18,9 @@ from nmm.analysis.formulas.expressions import (
     leaves,
     to_sympy,
 )
-from nmm.analysis.formulas.readable import condition, factored, in_names
-from nmm.analysis.formulas.symbolic_analysis import SymbolicAnalysis
-from nmm.analysis.formulas.zeros import Basis, Limits, Undecided, Zeros
-from nmm.base.findings import Finding
-from nmm.base.latex import Formula
+from nmm.plugins.symbolic.readable import condition, factored, in_names
+from nmm.plugins.symbolic.symbolic_analysis import SymbolicAnalysis
+from nmm.plugins.symbolic.zeros import Basis, Limits, Undecided, Zeros
 
 #: Smaller values are rounding, also by a file's digits, and count as zero.
 NOTHING = 1e-9

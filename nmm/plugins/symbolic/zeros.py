@@ -10,9 +10,9 @@ from typing import Any, NamedTuple, TypeAlias
 import flint
 import sympy
 
-from nmm.analysis.formulas.expansion import rational
-from nmm.analysis.formulas.expressions import Product, Sum, Symbol, Trig, leaves
-from nmm.analysis.formulas.trigonometric_factors import basis_of
+from nmm.plugins.symbolic.expansion import rational
+from nmm.plugins.symbolic.expressions import Product, Sum, Symbol, Trig, leaves
+from nmm.plugins.symbolic.trigonometric_factors import basis_of
 
 #: As `Trig` has it.
 Angle: TypeAlias = tuple[tuple[str, int], ...]

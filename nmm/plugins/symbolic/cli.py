@@ -16,9 +16,9 @@ from nmm.cli.document import say
 from nmm.cli.singularity_report import header, row_names
 
 if TYPE_CHECKING:
-    from nmm.analysis.formulas import Claim, SymbolicAnalysis
     from nmm.cli.subjects import Studied
     from nmm.model.robots.robot import Robot
+    from nmm.plugins.symbolic import Claim, SymbolicAnalysis
 
 #: Reasons for more minors than these are not given.
 MANY_REASONS = 12
@@ -43,7 +43,7 @@ class Conclusion(NamedTuple):
 
 
 def show_formulas(given: Studied, analysis: SymbolicAnalysis, chosen: Sequence[Columns] | None) -> None:
-    from nmm.analysis.formulas.symbolic_analysis import text_lines
+    from nmm.plugins.symbolic.symbolic_analysis import text_lines
 
     shown = only(analysis, chosen)
     body = list(text_lines(shown))
@@ -79,7 +79,7 @@ def show_latex(given: Studied, analysis: SymbolicAnalysis, chosen: Sequence[Colu
 def _body(given: Studied, analysis: SymbolicAnalysis, shown: SymbolicAnalysis) -> Iterator[str]:
     """The lines; `shown` has the chosen minors alone, what follows is of all."""
     from nmm import __version__
-    from nmm.analysis.formulas.symbolic_analysis import text_lines, zeros_summed
+    from nmm.plugins.symbolic.symbolic_analysis import text_lines, zeros_summed
 
     body, follows = shown.latex(), conclusions(given, analysis)
     items = list(_items(follows))
@@ -176,7 +176,7 @@ def _units(analysis: SymbolicAnalysis) -> Mapping[str, str]:
 
 
 def _zero(analysis: SymbolicAnalysis) -> list[str]:
-    from nmm.analysis.formulas.from_robot import numeric_arguments
+    from nmm.plugins.symbolic.from_robot import numeric_arguments
 
     return [name for name, value in numeric_arguments(analysis.robot).items() if value == 0.0]
 
@@ -187,7 +187,7 @@ def conclusions(given: Studied, analysis: SymbolicAnalysis) -> list[Conclusion]:
 
 
 def _of_rank(given: Studied, analysis: SymbolicAnalysis) -> Iterator[Conclusion]:
-    from nmm.analysis.formulas import lower_bound, singular_set
+    from nmm.plugins.symbolic import lower_bound, singular_set
 
     bound = lower_bound(analysis)
     if bound is None:
@@ -244,7 +244,7 @@ def _may_be_zero(robot: Robot, argument: str) -> bool:
 
 
 def _of_minors(analysis: SymbolicAnalysis) -> Iterator[Conclusion]:
-    from nmm.analysis.formulas import never_zero, vanishing
+    from nmm.plugins.symbolic import never_zero, vanishing
 
     nonzero = [columns for columns, form in analysis.minor_forms.items() if form.number]
     if len(nonzero) < 2:  # the only one vanishes where J is singular

@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from nmm.analysis.search.descent import Local, localised, shaken, stay_singular, tangents, walk
-from nmm.analysis.search.family import Relation, SingularFamily, merged
-from nmm.analysis.search.space import Search
 from nmm.base.arrays import Array, Flags
+from nmm.plugins.symbolic.search.descent import Local, localised, shaken, stay_singular, tangents, walk
+from nmm.plugins.symbolic.search.family import Relation, SingularFamily, merged
+from nmm.plugins.symbolic.search.space import Search
 
 #: What spreads less than this along a walk stays, in units.
 STAYS = 5e-5

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.analysis.search.descent import FLAT, descend
-from nmm.analysis.search.family import SingularFamily
-from nmm.analysis.search.sorting import family_at
-from nmm.analysis.search.space import TOLERANCE, Measure, Search, search_space
 from nmm.analysis.singular.jacobians import Jacobians, Subject, checked
 from nmm.analysis.singular.parts import WHOLE
 from nmm.base.arrays import Array, Flags, counted
 from nmm.base.progress import Progress
 from nmm.base.text_format import listed, value_text
+from nmm.plugins.symbolic.search.descent import FLAT, descend
+from nmm.plugins.symbolic.search.family import SingularFamily
+from nmm.plugins.symbolic.search.sorting import family_at
+from nmm.plugins.symbolic.search.space import TOLERANCE, Measure, Search, search_space
 
 #: Lengths of a tangent step that are tried.
 FACTORS = np.array([2.0, 1.0, 0.5, 0.1])

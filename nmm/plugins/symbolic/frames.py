@@ -14,8 +14,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from nmm.analysis.formulas.expansion import Expansion
-from nmm.analysis.formulas.geometry import (
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError
+from nmm.base.kernels import records
+from nmm.model.robots.robot import CENTER_OF_MASS, Robot
+from nmm.plugins.symbolic.expansion import Expansion
+from nmm.plugins.symbolic.geometry import (
     Geometry,
     Turning,
     Vector,
@@ -26,12 +30,8 @@ from nmm.analysis.formulas.geometry import (
     turned,
     unit_vectors,
 )
-from nmm.analysis.formulas.quotient import Linear, Quotient, Untraceable
-from nmm.analysis.formulas.written import Auxiliary
-from nmm.base.arrays import Array
-from nmm.base.errors import InputError
-from nmm.base.kernels import records
-from nmm.model.robots.robot import CENTER_OF_MASS, Robot
+from nmm.plugins.symbolic.quotient import Linear, Quotient, Untraceable
+from nmm.plugins.symbolic.written import Auxiliary
 
 
 def center(robot: Robot, geometry: Geometry) -> Vector:

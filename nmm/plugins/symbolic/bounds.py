@@ -8,12 +8,12 @@ from typing import Any
 import sympy
 from sympy.printing.str import StrPrinter
 
-from nmm.analysis.formulas.claims import NOTHING, Claim
-from nmm.analysis.formulas.expressions import Product, Sum, Symbol, Trig, alone, inline, is_constant, to_sympy
-from nmm.analysis.formulas.readable import condition, expanded
-from nmm.analysis.formulas.symbolic_analysis import SymbolicAnalysis
 from nmm.base.findings import Finding
 from nmm.base.latex import Formula, formula, linear_formula, minor_name, symbol
+from nmm.plugins.symbolic.claims import NOTHING, Claim
+from nmm.plugins.symbolic.expressions import Product, Sum, Symbol, Trig, alone, inline, is_constant, to_sympy
+from nmm.plugins.symbolic.readable import condition, expanded
+from nmm.plugins.symbolic.symbolic_analysis import SymbolicAnalysis
 
 
 @dataclass(frozen=True)

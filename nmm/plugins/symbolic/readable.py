@@ -8,8 +8,9 @@ from fractions import Fraction
 from functools import reduce
 from math import gcd, lcm
 
-from nmm.analysis.formulas.expansion import Expansion, Gaussian, Key, Ring, collected
-from nmm.analysis.formulas.expressions import (
+from nmm.base.latex import Formula, symbol
+from nmm.plugins.symbolic.expansion import Expansion, Gaussian, Key, Ring, collected
+from nmm.plugins.symbolic.expressions import (
     ZERO,
     Node,
     Product,
@@ -20,8 +21,7 @@ from nmm.analysis.formulas.expressions import (
     inline,
     is_constant,
 )
-from nmm.analysis.formulas.trigonometric_factors import factors_of
-from nmm.base.latex import Formula, symbol
+from nmm.plugins.symbolic.trigonometric_factors import factors_of
 
 #: Names of factors that several minors have, in the order in which they are given.
 FACTOR_NAMES = ("Lambda", "Gamma", "Phi", "Psi", "Omega")

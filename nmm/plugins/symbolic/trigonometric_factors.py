@@ -12,7 +12,7 @@ from typing import Any
 
 import flint
 
-from nmm.analysis.formulas.expansion import Expansion, Key, TooLarge, fraction, rational
+from nmm.plugins.symbolic.expansion import Expansion, Key, TooLarge, fraction, rational
 
 #: Most terms of a polynomial that FLINT is given.
 _LARGEST = 20_000

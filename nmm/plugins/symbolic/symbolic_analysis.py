@@ -14,18 +14,6 @@ import numpy as np
 import sympy
 from numpy.typing import ArrayLike
 
-from nmm.analysis.formulas.derivation import Derivation
-from nmm.analysis.formulas.expansion import Expansion, Ring, TooLarge, maximal_minors
-from nmm.analysis.formulas.expressions import Product, shown, to_sympy
-from nmm.analysis.formulas.readable import factored, in_names, named
-from nmm.analysis.formulas.written import (
-    ROTATION_VECTOR,
-    Turn,
-    Written,
-    auxiliary_written,
-    rotation_formula,
-    written,
-)
 from nmm.analysis.singular.minors import column_indices, permutation_sign
 from nmm.base.arrays import Array, scalar
 from nmm.base.errors import expect, expect_known
@@ -33,6 +21,18 @@ from nmm.base.findings import Finding
 from nmm.base.kernels.rotations import log3
 from nmm.base.latex import Formula, minor_name, symbol
 from nmm.model.robots.robot import Robot
+from nmm.plugins.symbolic.derivation import Derivation
+from nmm.plugins.symbolic.expansion import Expansion, Ring, TooLarge, maximal_minors
+from nmm.plugins.symbolic.expressions import Product, shown, to_sympy
+from nmm.plugins.symbolic.readable import factored, in_names, named
+from nmm.plugins.symbolic.written import (
+    ROTATION_VECTOR,
+    Turn,
+    Written,
+    auxiliary_written,
+    rotation_formula,
+    written,
+)
 
 #: Minors that are 0 are counted, not listed, if they are at least so many.
 _MANY = 4

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple, TypeAlias
 
 import sympy
 
-from nmm.analysis.formulas.expansion import Expansion
-from nmm.analysis.formulas.expressions import Product, Sum, Symbol, alone, shown, to_sympy
-from nmm.analysis.formulas.quotient import Linear
-from nmm.analysis.formulas.readable import as_sum, factored
 from nmm.base.latex import Formula, formula
+from nmm.plugins.symbolic.expansion import Expansion
+from nmm.plugins.symbolic.expressions import Product, Sum, Symbol, alone, shown, to_sympy
+from nmm.plugins.symbolic.quotient import Linear
+from nmm.plugins.symbolic.readable import as_sum, factored
 
 
 @dataclass(frozen=True)

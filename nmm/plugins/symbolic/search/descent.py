@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import Bounds, minimize
 
-from nmm.analysis.search.space import ROUNDING, Search
 from nmm.analysis.singular.parts import null_space
 from nmm.base.arrays import Array, Flags, Integers
 from nmm.base.progress import Progress
+from nmm.plugins.symbolic.search.space import ROUNDING, Search
 
 #: So many of the lowest ends are followed to the bottom.
 FOLLOWED = 3
