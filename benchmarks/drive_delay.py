@@ -16,9 +16,9 @@ import numpy as np
 from playwright.sync_api import Page, sync_playwright
 
 import nmm
-from nmm.driving import RobotSetup
-from nmm.driving.driven import Driven
-from nmm.driving.session import DriveSession
+from nmm.plugins.live.driving import RobotSetup
+from nmm.plugins.live.driving.driven import Driven
+from nmm.plugins.live.driving.session import DriveSession
 
 DRAGS = 30
 #: Told of each drag, ms: from the event to the pose, and the longest frame meanwhile.

@@ -20,7 +20,7 @@ from machine import described
 from tables import Section, into, text
 
 import nmm
-from nmm.rendering.chromium import HeadlessPage
+from nmm.plugins.live.rendering.chromium import HeadlessPage
 from nmm.views.playback import write_html
 
 SIZE, OPENED, FRAMES = (1280, 720), 5, 12

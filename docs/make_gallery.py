@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import nmm
 from nmm.base.bundled import bundled_scenarios
-from nmm.rendering.chromium import NAMES
+from nmm.plugins.live.rendering.chromium import NAMES
 
 if TYPE_CHECKING:
     from PIL import Image

@@ -24,7 +24,7 @@ from PIL import Image
 
 import nmm
 from nmm.base.errors import expect_known
-from nmm.rendering.chromium import HeadlessPage
+from nmm.plugins.live.rendering.chromium import HeadlessPage
 from nmm.views.figures import overview, save
 from nmm.views.playback import write_html
 

@@ -1,7 +1,5 @@
 from . import analysis as analysis
-from . import driving as driving
 from . import extending as extending
-from . import rendering as rendering
 from . import ros as ros
 from .base.errors import DivergedError as DivergedError
 from .base.errors import InputError as InputError
@@ -117,6 +115,8 @@ from .motion.disturbances import Disturbances as Disturbances
 from .motion.simulation import simulate as simulate
 from .motion.trajectory import Outcome as Outcome
 from .motion.trajectory import Trajectory as Trajectory
+from .plugins.live import driving as driving
+from .plugins.live import rendering as rendering
 from .plugins.planning.horizon import Horizon as Horizon
 from .plugins.planning.parking import Parking as Parking
 from .plugins.planning.plan import Plan as Plan

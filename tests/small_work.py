@@ -38,7 +38,7 @@ class Page:
 
 def film() -> None:
     """`nmm render` with a small ffmpeg, and no browser."""
-    from nmm.rendering import render
+    from nmm.plugins.live.rendering import render
 
     folder = Path.cwd().parent / "programs"
     folder.mkdir(exist_ok=True)

@@ -19,7 +19,7 @@ from ports import served
 from short_scenario import MINIMAL
 
 import nmm
-from nmm.driving import ScenarioSetup, drive
+from nmm.plugins.live.driving import ScenarioSetup, drive
 from nmm.views.playback import view, write_html
 
 #: Each fault: how bad it is, which rule, and where.

@@ -25,8 +25,8 @@ import nmm.cli.runs
 from nmm.base.figure_options import FigureOptions
 from nmm.cli.exit_status import status_of
 from nmm.cli.options import chosen, named
-from nmm.cli.playing import runs_in
 from nmm.cli.runs import run as run_scenario
+from nmm.plugins.live.cli import runs_in
 from nmm.views.tables import Table
 
 SHORT = ("--set", "duration=0.5")

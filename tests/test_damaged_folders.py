@@ -17,8 +17,8 @@ from fuzz.damaging import copied, whole_folders
 import nmm
 from nmm.base.bundled import bundled_robots
 from nmm.cli.exit_status import status_of
-from nmm.cli.playing import runs_in
 from nmm.model.robots.loading.description import describe
+from nmm.plugins.live.cli import runs_in
 
 
 @pytest.fixture(scope="module")

@@ -17,8 +17,8 @@ from ports import MOST, served
 
 import nmm
 from nmm.base.resolver_style import resolver_styles
-from nmm.driving import DriveSetup, RobotSetup, ScenarioSetup, drive
 from nmm.model.robots.configuration import Configuration
+from nmm.plugins.live.driving import DriveSetup, RobotSetup, ScenarioSetup, drive
 
 #: Where a point of a gizmo is in the window, px: its ball, or the tip of the arrow along an axis.
 WHERE = """([target, way, length]) => {

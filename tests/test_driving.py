@@ -25,11 +25,11 @@ import nmm
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError, ScenarioError
 from nmm.base.kinds import RESOLVERS
-from nmm.driving.driven import Driven, Reaching
-from nmm.driving.planning import Planning
-from nmm.driving.session import Aim, DriveSession, Order, Pick, parsed
-from nmm.driving.setups import DriveSetup, RobotSetup, ScenarioSetup, Settings
 from nmm.model.robots.configuration import Configuration
+from nmm.plugins.live.driving.driven import Driven, Reaching
+from nmm.plugins.live.driving.planning import Planning
+from nmm.plugins.live.driving.session import Aim, DriveSession, Order, Pick, parsed
+from nmm.plugins.live.driving.setups import DriveSetup, RobotSetup, ScenarioSetup, Settings
 from nmm.views.playback.rolling import Rolling
 
 KINDS = ("rg", "pg", "ej", "dls")
@@ -38,7 +38,7 @@ KINDS = ("rg", "pg", "ej", "dls")
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Plans are looked for as long as a busy machine needs."""
-    monkeypatch.setattr("nmm.driving.planning.SECONDS", MOST)
+    monkeypatch.setattr("nmm.plugins.live.driving.planning.SECONDS", MOST)
 
 
 def scenario(name: str = "unicycle_3r_position") -> ScenarioSetup:
@@ -483,7 +483,7 @@ def test_pause_restart_and_choices_are_told() -> None:
 
 
 def test_an_aim_shows_before_the_next_picture_is_due(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nmm.playback.session.FPS", 0.01)
+    monkeypatch.setattr("nmm.plugins.live.session.FPS", 0.01)
     with Loop(RobotSetup(nmm.load("unicycle_2r"), [nmm.Position("ee", "xy")], np.zeros(5))) as loop:
         first = loop.latest().splitlines()[-2]
         began = loop.session._driven.targets[0].signal.value

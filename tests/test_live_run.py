@@ -20,8 +20,8 @@ from ports import MOST, listening, wait_for
 import nmm
 from nmm.model.robots.configuration import Configuration
 from nmm.motion.trajectory import Trajectory
-from nmm.playback.running import ALL, KEPT
-from nmm.playback.session import AHEAD, FPS, Watching, counted
+from nmm.plugins.live.running import ALL, KEPT
+from nmm.plugins.live.session import AHEAD, FPS, Watching, counted
 from nmm.views.playback import LiveRun
 
 DT = 0.005

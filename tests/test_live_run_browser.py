@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, Page
 from ports import MOST, wait_for
 
 import nmm
-from nmm.playback.session import FPS
+from nmm.plugins.live.session import FPS
 
 DURATION = 6.0
 #: Whether a page plays what has run; while it is loaded anew it has no script yet.

@@ -28,7 +28,7 @@ from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading.packages import package_file
 from nmm.model.robots.mimic_joints import MimicJoint
 from nmm.model.robots.robot import Robot
-from nmm.playback.viewer import viewer_scene
+from nmm.plugins.live.viewer import viewer_scene
 from nmm.plugins.symbolic import symbolic
 from nmm.plugins.symbolic.search.many_starts import find_singularities
 from nmm.plugins.symbolic.search.nearest import nearest_singularity

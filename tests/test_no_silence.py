@@ -23,7 +23,7 @@ from nmm.cli.app import app
 from nmm.cli.exit_status import main, status_of
 from nmm.cli.output import readable, show_table, show_text
 from nmm.model.robots.motion import Motion
-from nmm.rendering.encoder import expect_video
+from nmm.plugins.live.rendering.encoder import expect_video
 from nmm.views.playback import write_html
 
 MOST = 120.0
@@ -96,7 +96,7 @@ def test_the_end_of_a_file_is_no_interrupt(
     def raises(*_: object, **__: object) -> None:
         raise EOFError
 
-    monkeypatch.setattr("nmm.cli.playing.runs_in", raises)
+    monkeypatch.setattr("nmm.plugins.live.cli.runs_in", raises)
     assert status_of(["play", "o"]) == 1
     assert capsys.readouterr().err.strip() == "nmm play: what was read ended too early"
 

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser
 from ports import MOST
 
 from nmm.model.robots.robot import Robot
-from nmm.playback.server import PageServer
+from nmm.plugins.live.server import PageServer
 from nmm.views.playback import LiveViewer
 from nmm.views.playback.html import socket_page
 

@@ -17,10 +17,10 @@ from ports import MOST, served
 
 import nmm
 from nmm.control.step.quantities import QUANTITIES
-from nmm.driving import ScenarioSetup, drive
-from nmm.driving.driven import Driven
-from nmm.driving.things import Things
-from nmm.playback.running import Growing
+from nmm.plugins.live.driving import ScenarioSetup, drive
+from nmm.plugins.live.driving.driven import Driven
+from nmm.plugins.live.driving.things import Things
+from nmm.plugins.live.running import Growing
 from nmm.views.playback import write_html
 
 PIXELS = [525.0, 500.0, 320.0, 240.0]

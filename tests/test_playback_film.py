@@ -14,7 +14,7 @@ from playback_robot import drive
 from playwright.sync_api import Page
 
 from nmm.model.robots.robot import Robot
-from nmm.rendering.encoder import find_ffmpeg
+from nmm.plugins.live.rendering.encoder import find_ffmpeg
 
 FILM = """async (told) => {
   const shares = [];

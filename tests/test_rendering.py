@@ -29,8 +29,8 @@ from ports import MOST
 import nmm
 from nmm.base.errors import InputError, RunError
 from nmm.model.robots.robot import Robot
-from nmm.rendering import encoder, render
-from nmm.rendering.chromium import HeadlessPage
+from nmm.plugins.live.rendering import encoder, render
+from nmm.plugins.live.rendering.chromium import HeadlessPage
 
 SMALL = (160, 96)
 

@@ -10,8 +10,8 @@ from ports import listening
 
 import nmm
 from nmm.base.errors import InputError
-from nmm.playback import session
-from nmm.playback.session import FPS, LATE, Clock, Session, message
+from nmm.plugins.live import session
+from nmm.plugins.live.session import FPS, LATE, Clock, Session, message
 from nmm.views.playback.rolling import RolledRobot, Rolling
 
 KINDS = {"aim": ("task", "value"), "go": ()}

@@ -30,7 +30,7 @@ from ports import MOST, free_port, listening, served
 
 import nmm
 from nmm.model.robots.robot import Robot
-from nmm.playback.viewer import asked_for
+from nmm.plugins.live.viewer import asked_for
 from nmm.views.playback import view
 from nmm.views.playback.extent import corners
 from nmm.views.playback.rolling import Rolling

@@ -22,8 +22,8 @@ from ports import MOST, free_port, listening, wait_for
 import nmm
 from nmm.base.errors import InputError
 from nmm.model.robots.robot import Robot
-from nmm.playback.viewed_task import ViewedTask
-from nmm.playback.viewer import asked_for
+from nmm.plugins.live.viewed_task import ViewedTask
+from nmm.plugins.live.viewer import asked_for
 from nmm.scenario.short_task import short_task
 from nmm.views.playback import view
 

@@ -19,7 +19,7 @@ from nmm.base.errors import NmmError, expect_known
 from nmm.base.processes import share_out
 from nmm.base.progress import Progress, between
 from nmm.motion.table import summary_rows
-from nmm.rendering.chromium import HeadlessPage
+from nmm.plugins.live.rendering.chromium import HeadlessPage
 from nmm.views.figures import save, stroboscopic
 from nmm.views.folders.whole import FolderKind, replaced_folder
 from nmm.views.playback.html import page_of, viewer_script

@@ -25,7 +25,7 @@ GROUP = "nmm.plugins"
 SHIPPED = (
     "nmm.plugins.planning.plugin:PLUGIN",
     "nmm.plugins.symbolic.plugin:PLUGIN",
-    "nmm.driving.plugin:PLUGIN",
+    "nmm.plugins.live.plugin:PLUGIN",
     "nmm.ros.plugin:PLUGIN",
     "nmm.sweeps.plugin:PLUGIN",
 )

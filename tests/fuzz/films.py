@@ -19,8 +19,8 @@ from hypothesis import strategies as st
 
 from nmm.base.errors import RunError
 from nmm.cli.exit_status import status_of
-from nmm.rendering.chromium import find_browser
-from nmm.rendering.encoder import find_ffmpeg
+from nmm.plugins.live.rendering.chromium import find_browser
+from nmm.plugins.live.rendering.encoder import find_ffmpeg
 
 from .damaging import copied, damage, whole_folders
 from .hunting import LONGEST_LINE, Hunt

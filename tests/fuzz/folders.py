@@ -14,7 +14,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from nmm.base.errors import NmmError
-from nmm.cli.playing import runs_in
+from nmm.plugins.live.cli import runs_in
 from nmm.views.playback.html import page_of
 
 from .damaging import copied, damage, whole_folders

@@ -274,7 +274,7 @@ class Robot(Coordinates):
 
     def _repr_html_(self) -> str:
         """In a notebook: the page that shows it, with a slider for each coordinate."""
-        page: str = lazy_call("nmm.playback.viewer:of_robot")(self)
+        page: str = lazy_call("nmm.plugins.live.viewer:of_robot")(self)
         return page
 
     def S(self, q: ArrayLike) -> Array:

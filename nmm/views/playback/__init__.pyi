@@ -1,7 +1,7 @@
-from nmm.playback.live import LiveViewer as LiveViewer
-from nmm.playback.live import play as play
-from nmm.playback.running import LiveRun as LiveRun
-from nmm.playback.viewer import view as view
+from nmm.plugins.live.live import LiveViewer as LiveViewer
+from nmm.plugins.live.live import play as play
+from nmm.plugins.live.running import LiveRun as LiveRun
+from nmm.plugins.live.viewer import view as view
 
 from .cameras import Camera as Camera
 from .ellipsoids import EllipsoidOptions as EllipsoidOptions

@@ -17,10 +17,10 @@ from nmm.cli.output import progress, show_text, warn
 if TYPE_CHECKING:
     from nmm.control.functions.function import Function
     from nmm.control.functions.tasks import Task
-    from nmm.driving.setups import DriveSetup
     from nmm.model.robots.motion import Motion
     from nmm.model.robots.robot import Robot
     from nmm.motion.trajectory import Trajectory
+    from nmm.plugins.live.driving.setups import DriveSetup
     from nmm.scenario import Scenario
 
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A folder of `nmm run` or `nmm compare`.")]
@@ -62,7 +62,7 @@ def render(
     nmm render runs/unicycle_2r_position-rg --video motion.mp4
     nmm render runs/unicycle_2r_position-compare --video apart.gif --size 640x400 --fps 12 --apart 1
     """
-    from nmm.rendering import render as render_runs
+    from nmm.plugins.live.rendering import render as render_runs
 
     drawn = ellipsoids.wanted()
     found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", size)
@@ -147,7 +147,7 @@ def view(
             raise InputError(what, where=subject, expected="a robot or a scenario")
         q = robot.rest
         if scenario is not None:
-            from nmm.playback.viewer import asked_for
+            from nmm.plugins.live.viewer import asked_for
 
             beside = asked_for(scenario, robot)
             q, tasks = beside.q[0], _viewable(scenario, robot)
@@ -210,8 +210,8 @@ def drive(subject: Subject, browser: Browser, loading: Loading) -> None:
     nmm drive my_robot.urdf --platform car --task position:gripper:xyz --at shoulder=pi/4
     """
     from nmm.cli.subjects import studied
-    from nmm.driving import RobotSetup, ScenarioSetup
-    from nmm.driving import drive as drive_in_browser
+    from nmm.plugins.live.driving import RobotSetup, ScenarioSetup
+    from nmm.plugins.live.driving import drive as drive_in_browser
 
     asked = subject.keywords() | loading.keywords()
     found = studied(subject.subject, to_drive=True, **asked)

@@ -19,8 +19,8 @@ from nmm.control.functions.function import Function
 from nmm.control.functions.tasks.task import Task
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
-from nmm.playback.server import Visitor
-from nmm.playback.session import message
+from nmm.plugins.live.server import Visitor
+from nmm.plugins.live.session import message
 from nmm.views.playback.drawing import Command, Drawing, encode
 from nmm.views.playback.ellipsoids import ARM_COLOR, OPACITY, THINNEST, draw_legend
 from nmm.views.playback.extent import extent_of

@@ -19,10 +19,10 @@ from nmm.control.functions.references.live_target import LiveTarget
 from nmm.control.functions.tasks.task import Task
 from nmm.control.goal import Goal
 from nmm.control.resolvers import CallableResolver, ProjectedGradient
-from nmm.driving.driven import Driven
-from nmm.driving.setups import led_by
 from nmm.model.robots.frame_path import FramePath
 from nmm.model.robots.motion import Motion
+from nmm.plugins.live.driving.driven import Driven
+from nmm.plugins.live.driving.setups import led_by
 from nmm.plugins.planning.plan import Plan
 from nmm.plugins.planning.planned import plan
 from nmm.views.playback.drawing import Command, packed

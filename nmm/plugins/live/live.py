@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from nmm.base.arrays import vector
 from nmm.base.ellipsoid_options import Wanted
 from nmm.model.robots.robot import Robot
-from nmm.playback.server import Visitor
-from nmm.playback.session import RobotSession, Session
+from nmm.plugins.live.server import Visitor
+from nmm.plugins.live.session import RobotSession, Session
 from nmm.views.playback.rolling import RolledRobot
 from nmm.views.playback.scene import Shown, playback_scene
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from nmm.base.errors import RunError
-from nmm.rendering.encoder import last_words
+from nmm.plugins.live.rendering.encoder import last_words
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
 OPTIONS = (

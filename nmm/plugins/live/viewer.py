@@ -19,7 +19,7 @@ from nmm.model.robots.motion import Motion
 from nmm.model.robots.reach import first_tip, tips
 from nmm.model.robots.robot import Robot
 from nmm.motion.shown_frame import shown_frame
-from nmm.playback.session import Session
+from nmm.plugins.live.session import Session
 from nmm.views.playback.drawing import Command, Drawing, segment
 from nmm.views.playback.extent import robot_boxes
 from nmm.views.playback.html import HEIGHT, file_page, framed
@@ -29,7 +29,7 @@ from nmm.views.playback.scene import draw_beside, live_scene, points_beside, sti
 from nmm.views.playback.shapes import DrawnRobot
 
 if TYPE_CHECKING:
-    from nmm.playback.viewed_task import ViewedTask
+    from nmm.plugins.live.viewed_task import ViewedTask
     from nmm.scenario import Scenario
 
 SCRIPTS = ("viewer_joints.js", "viewer_labels.js", "viewer_frames.js", "viewer_task.js")
@@ -89,7 +89,7 @@ def view(
     at = robot.rest if q is None else robot.q(q)
     viewed = None
     if task is not None:
-        from nmm.playback.viewed_task import ViewedTask  # with it comes the whole of the analysis
+        from nmm.plugins.live.viewed_task import ViewedTask  # with it comes the whole of the analysis
 
         several = task.tasks if isinstance(task, Stack) else task if isinstance(task, Sequence) else (task,)
         viewed = ViewedTask(robot, tuple(several), at)

@@ -27,8 +27,8 @@ from nmm.motion.recording import Recorder
 from nmm.motion.seen import SeenPoints
 from nmm.motion.shown_frame import shown_frame
 from nmm.motion.trajectory import Trajectory
-from nmm.playback.server import Visitor
-from nmm.playback.session import RobotSession, Watching, counted
+from nmm.plugins.live.server import Visitor
+from nmm.plugins.live.session import RobotSession, Watching, counted
 from nmm.views.playback.cameras import live_numbers
 from nmm.views.playback.channels import live_channels, partition_text
 from nmm.views.playback.drawing import Drawing, encode, packed

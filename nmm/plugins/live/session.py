@@ -21,7 +21,7 @@ from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.robots.motion import Camera
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.surroundings import NO_SURROUNDINGS, Surroundings
-from nmm.playback.server import PageServer, Visitor
+from nmm.plugins.live.server import PageServer, Visitor
 from nmm.views.playback.cameras import draw_camera, tell_cameras
 from nmm.views.playback.channels import Channel, Channels, draw_curves
 from nmm.views.playback.drawing import Command, Drawing, encode

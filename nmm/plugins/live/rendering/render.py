@@ -12,8 +12,8 @@ from nmm.base.arrays import counted, positive
 from nmm.base.ellipsoid_options import Wanted
 from nmm.base.errors import InputError, expect, expect_known
 from nmm.base.progress import Progress
-from nmm.rendering.chromium import HeadlessPage, find_browser
-from nmm.rendering.encoder import encode, expect_video, find_ffmpeg
+from nmm.plugins.live.rendering.chromium import HeadlessPage, find_browser
+from nmm.plugins.live.rendering.encoder import encode, expect_video, find_ffmpeg
 from nmm.views.playback.html import write_html
 from nmm.views.playback.scene import Shown
 

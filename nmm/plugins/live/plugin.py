@@ -4,6 +4,6 @@ from nmm.base.plugins import Plugin
 
 PLUGIN = Plugin(
     "live",
-    commands={name: f"nmm.cli.playing:{name}" for name in ("play", "render", "view", "drive")},
+    commands={name: f"nmm.plugins.live.cli:{name}" for name in ("play", "render", "view", "drive")},
     after={"play": "paper", "render": "play", "view": "check", "drive": "view"},
 )

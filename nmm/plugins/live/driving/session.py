@@ -18,14 +18,14 @@ from pydantic.dataclasses import dataclass
 from nmm.base.arrays import finite
 from nmm.base.errors import InputError, NmmError
 from nmm.base.resolver_style import looks
-from nmm.driving.driven import Driven, Look, Made
-from nmm.driving.planning import Planning, later, why
-from nmm.driving.setups import Choice, DriveSetup, named
 from nmm.model.robots.motion import Camera
 from nmm.motion.components import Axes
 from nmm.motion.seen import SeenPoints
-from nmm.playback.server import Visitor
-from nmm.playback.session import FPS, RobotSession
+from nmm.plugins.live.driving.driven import Driven, Look, Made
+from nmm.plugins.live.driving.planning import Planning, later, why
+from nmm.plugins.live.driving.setups import Choice, DriveSetup, named
+from nmm.plugins.live.server import Visitor
+from nmm.plugins.live.session import FPS, RobotSession
 from nmm.views.playback.cameras import live_numbers
 from nmm.views.playback.channels import live_channels
 from nmm.views.playback.drawing import Drawing, encode

@@ -12,12 +12,12 @@ from nmm.base.errors import NmmError, expect
 from nmm.control.controller import Controller
 from nmm.control.functions.program import evaluate
 from nmm.control.step.step import Step
-from nmm.driving.setups import Choice, DriveSetup, Settings, aimed, named, targets_of
-from nmm.driving.things import Thing, Things
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import CENTER_OF_MASS
 from nmm.motion.diagnosis.reasons import out_of_reach, stretched
+from nmm.plugins.live.driving.setups import Choice, DriveSetup, Settings, aimed, named, targets_of
+from nmm.plugins.live.driving.things import Thing, Things
 from nmm.views.playback.rolling import RolledRobot
 
 #: A robot farther away than this, m, has diverged.

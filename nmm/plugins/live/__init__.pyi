@@ -1,0 +1,2 @@
+from . import driving as driving
+from . import rendering as rendering
