@@ -1,6 +1,5 @@
 from . import analysis as analysis
 from . import extending as extending
-from . import ros as ros
 from .base.errors import DivergedError as DivergedError
 from .base.errors import InputError as InputError
 from .base.errors import NmmError as NmmError
@@ -122,11 +121,12 @@ from .plugins.planning.parking import Parking as Parking
 from .plugins.planning.plan import Plan as Plan
 from .plugins.planning.planned import plan as plan
 from .plugins.planning.replan import replan as replan
-from .robots.odometry import Odometry as Odometry
+from .plugins.robot import ros as ros
+from .plugins.robot.loop_state import LoopState as LoopState
+from .plugins.robot.odometry import Odometry as Odometry
+from .plugins.robot.robot_loop import Loop as Loop
+from .plugins.robot.ros.bag import read_bag as read_bag
 from .rollouts.rollout import rollout as rollout
-from .ros.bag import read_bag as read_bag
-from .runs.loop_state import LoopState as LoopState
-from .runs.robot_loop import Loop as Loop
 from .scenario import Scenario as Scenario
 from .scenario.scaffold import first_scenario as first_scenario
 from .sweeps import Sweep as Sweep

@@ -15,7 +15,7 @@ from robot_logs import FIRST, STORE, Sent, bag, bag_of_ros1, joints, odom, tf, t
 import nmm
 from nmm.base.errors import InputError
 from nmm.cli.exit_status import status_of
-from nmm.findings import bag as bag_words
+from nmm.plugins.robot import bag_findings as bag_words
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*:RuntimeWarning")
 NAN = math.nan

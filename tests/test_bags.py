@@ -249,7 +249,7 @@ def test_a_run_beside_a_log(
     assert again.summary()["settling_time"] is None
     told = capsys.readouterr().out
     assert "platform" in told
-    from nmm.ros.difference import difference
+    from nmm.plugins.robot.ros.difference import difference
 
     moved = nmm.read_bag(log, run.robot)
     moved.q[:, 0] += 0.03
@@ -303,7 +303,7 @@ def test_another_robots_bag_says_what_is_missing(log: Path, tmp_path: Path) -> N
 def test_nothing_half_written_is_left(
     run: nmm.Trajectory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import nmm.ros.log
+    import nmm.plugins.robot.ros.log
 
     for wrong in (tmp_path / "run.bag", tmp_path):
         with pytest.raises(InputError):
@@ -315,7 +315,7 @@ def test_nothing_half_written_is_left(
         yield 0, "/a", STORE.types["std_msgs/msg/String"](data="a")
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(nmm.ros.log, "messages_of", failing)
+    monkeypatch.setattr(nmm.plugins.robot.ros.log, "messages_of", failing)
     with pytest.raises(nmm.NmmError):
         run.save_mcap(there)
     assert there.read_bytes() == b"before"

@@ -17,9 +17,10 @@ import nmm
 from nmm.base.findings import Finding, run, words
 from nmm.base.findings.run import line
 from nmm.cli import runs as commands
-from nmm.findings import bag, loop
 from nmm.motion.diagnosis.judgement import Trials
 from nmm.motion.verdict import Awaited
+from nmm.plugins.robot import bag_findings as bag
+from nmm.plugins.robot import findings as loop
 
 PART = {"name": "q1", "t": 0.5, "value": 1.25, "unit": "rad", "lower": -1.0, "upper": 1.0}
 FLAW = {"meaning": "the task Jacobian J lost rank", "lost": ["tilt of tool about x"], "level": None}

@@ -14,7 +14,7 @@ from findings import codes
 import nmm
 from nmm.base.arrays import Array
 from nmm.model.robots.robot import Robot
-from nmm.ros.difference import difference
+from nmm.plugins.robot.ros.difference import difference
 
 TURN = 2.0 * np.pi
 LIMITS = nmm.Limits(velocity={"platform": 1.0, "arm": 2.0}, acceleration=4.0)

@@ -18,7 +18,7 @@ from test_robot_description import mesh_beside
 from urdf_parts import joint, link, robot, shape, write
 
 import nmm
-from nmm.ros.description import packaged
+from nmm.plugins.robot.ros.description import packaged
 
 STRUCTS = {"/odom": "Odometry", "/path": "Path", "/desired_path": "Path", "/cmd_vel": "TwistStamped"}
 

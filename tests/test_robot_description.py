@@ -20,9 +20,9 @@ import nmm
 from nmm.base.arrays import Array
 from nmm.cli.exit_status import status_of
 from nmm.model.robots.robot import Robot
-from nmm.ros.description import description, packaged
-from nmm.ros.links import Links
-from nmm.ros.making import root_link
+from nmm.plugins.robot.ros.description import description, packaged
+from nmm.plugins.robot.ros.links import Links
+from nmm.plugins.robot.ros.making import root_link
 from nmm.views.playback.placements import rolling_joints
 
 typesys = pytest.importorskip("rosbags.typesys")

@@ -14,9 +14,9 @@ from wandering import beyond
 
 import nmm
 from nmm.base.findings import Finding
-from nmm.findings.loop import WORDS
 from nmm.model.robots.zero_order_hold import HeldInputs
-from nmm.runs.measured_state import Refused
+from nmm.plugins.robot.findings import WORDS
+from nmm.plugins.robot.measured_state import Refused
 
 Array = np.ndarray
 START = {"q1": 0.3, "q2": 0.9}

@@ -26,7 +26,7 @@ SHIPPED = (
     "nmm.plugins.planning.plugin:PLUGIN",
     "nmm.plugins.symbolic.plugin:PLUGIN",
     "nmm.plugins.live.plugin:PLUGIN",
-    "nmm.ros.plugin:PLUGIN",
+    "nmm.plugins.robot.plugin:PLUGIN",
     "nmm.sweeps.plugin:PLUGIN",
 )
 #: What errors call the kinds that a plugin can add.

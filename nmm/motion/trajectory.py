@@ -277,7 +277,7 @@ class Trajectory:
         InputError : without the extra `ros`, another suffix, a run without samples, a place that cannot be
             written; no part of a file is left then
         """
-        written: Path = lazy_call("nmm.ros.log:save_mcap")(self, path, start)
+        written: Path = lazy_call("nmm.plugins.robot.ros.log:save_mcap")(self, path, start)
         return written
 
     @staticmethod

@@ -215,8 +215,8 @@ class Robot(Coordinates):
 
     @cached_property
     def _encoders(self) -> Any:
-        """What reads the joints' encoders (`nmm.robots.encoders.Encoders`)."""
-        return lazy_call("nmm.robots.encoders:Encoders")(self)
+        """What reads the joints' encoders (`nmm.plugins.robot.encoders.Encoders`)."""
+        return lazy_call("nmm.plugins.robot.encoders:Encoders")(self)
 
     def odometry(self, q: ArrayLike, encoders: Mapping[str, float], **options: Any) -> Any:
         """A platform's pose by its wheels' encoders, from q (n,) on (`nmm.Odometry`).
@@ -240,7 +240,7 @@ class Robot(Coordinates):
         InputError : counters that do not determine all inputs, by name; a joint without measurement; a fixed
             base
         """
-        return lazy_call("nmm.robots.odometry:Odometry")(self, q, encoders, **options)
+        return lazy_call("nmm.plugins.robot.odometry:Odometry")(self, q, encoders, **options)
 
     def wheel_speeds(self, u: ArrayLike, q: ArrayLike | None = None) -> dict[str, float]:
         """Speeds of the wheels that inputs u determine, (p,) or (n_u,), by joint, rad/s, with the joints' own
@@ -252,7 +252,7 @@ class Robot(Coordinates):
         >>> nmm.load("differential_base", platform="unicycle").wheel_speeds([0.5, 0.0])
         {'left_wheel_joint': 5.0, 'right_wheel_joint': 5.0}
         """
-        found: dict[str, float] = lazy_call("nmm.robots.odometry:wheel_speeds")(self, u, q)
+        found: dict[str, float] = lazy_call("nmm.plugins.robot.odometry:wheel_speeds")(self, u, q)
         return found
 
     def platform_inputs(self, speeds: Mapping[str, float], q: ArrayLike | None = None) -> Array:
@@ -269,7 +269,7 @@ class Robot(Coordinates):
         >>> robot.platform_inputs({"left_wheel_joint": 4.0, "right_wheel_joint": 6.0}).round(3)
         array([0.5, 0.5])
         """
-        found: Array = lazy_call("nmm.robots.odometry:platform_inputs")(self, speeds, q)
+        found: Array = lazy_call("nmm.plugins.robot.odometry:platform_inputs")(self, speeds, q)
         return found
 
     def _repr_html_(self) -> str:

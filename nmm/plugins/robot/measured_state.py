@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from nmm.base.arrays import Array
 from nmm.control.goal import METRES, unit_codes
 from nmm.model.robots.robot import Robot
-from nmm.runs.held_history import HeldHistory
+from nmm.plugins.robot.held_history import HeldHistory
 
 
 class Refused(StrEnum):

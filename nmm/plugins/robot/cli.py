@@ -38,7 +38,7 @@ def export(
     nmm export runs/unicycle_2r_position-rg --mcap here.mcap --start 1700000000
     """
     from nmm.motion.trajectory import Trajectory
-    from nmm.ros.description import packaged
+    from nmm.plugins.robot.ros.description import packaged
 
     if not mcap:
         raise InputError("say what to write", where="nmm export", expected="--mcap")
@@ -99,8 +99,8 @@ class LogOptions(OptionGroup):
 def compare_with_bag(source: str, bag: Path, out: Path | None, names: LogOptions) -> int:
     """Tell how far a bag's motion is from a run's, and write both as a comparison."""
     from nmm.motion.trajectory import Trajectory
-    from nmm.ros.bag import read_bag
-    from nmm.ros.difference import difference
+    from nmm.plugins.robot.ros.bag import read_bag
+    from nmm.plugins.robot.ros.difference import difference
     from nmm.views.folders import comparison
     from nmm.views.folders.whole import check_folder
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from nmm.base.errors import expect
 from nmm.model.robots.robot import Robot
-from nmm.ros.reading import name_of, nanoseconds
+from nmm.plugins.robot.ros.reading import name_of, nanoseconds
 
 
 def timed_joints(robot: Robot) -> set[str]:

@@ -13,7 +13,7 @@ import pinocchio as pin
 from nmm.base.arrays import Array
 from nmm.model.robots.loading.provenance import provenance_of
 from nmm.model.robots.robot import Robot
-from nmm.ros.links import Link, Links
+from nmm.plugins.robot.ros.links import Link, Links
 from nmm.views.playback.placements import joint_screw
 from nmm.views.playback.sticks import appearance
 

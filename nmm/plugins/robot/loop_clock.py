@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from nmm.runs.loop_log import LoopFindings
+from nmm.plugins.robot.loop_log import LoopFindings
 
 #: A call so many periods after the one before is late.
 LATE = 1.5

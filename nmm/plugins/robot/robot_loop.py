@@ -14,13 +14,13 @@ from nmm.base.errors import InputError
 from nmm.base.findings import Finding
 from nmm.control.controller import Controller
 from nmm.motion.trajectory import Trajectory
-from nmm.runs.loop_clock import LoopClock
-from nmm.runs.loop_inputs import LoopInputs
-from nmm.runs.loop_log import LoopFindings, LoopLog
-from nmm.runs.loop_state import LoopState
-from nmm.runs.loop_watch import LoopWatch
-from nmm.runs.measured_state import MeasuredState, Tolerances
-from nmm.runs.pace import keep_pace
+from nmm.plugins.robot.loop_clock import LoopClock
+from nmm.plugins.robot.loop_inputs import LoopInputs
+from nmm.plugins.robot.loop_log import LoopFindings, LoopLog
+from nmm.plugins.robot.loop_state import LoopState
+from nmm.plugins.robot.loop_watch import LoopWatch
+from nmm.plugins.robot.measured_state import MeasuredState, Tolerances
+from nmm.plugins.robot.pace import keep_pace
 
 _STOPS = LoopState.STOPPING, LoopState.STOPPED
 

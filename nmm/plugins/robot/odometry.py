@@ -14,7 +14,7 @@ from nmm.base.text_format import apart
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.wheel_rates import wheel_rates, wheel_shares
 from nmm.model.robots.zero_order_hold import HeldInputs
-from nmm.robots.encoders import Turns
+from nmm.plugins.robot.encoders import Turns
 
 #: Where Gauss and Legendre look between two readings, for two looks.
 NODES = 0.5 - math.sqrt(3.0) / 6.0, 0.5 + math.sqrt(3.0) / 6.0

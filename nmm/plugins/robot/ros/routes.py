@@ -9,10 +9,10 @@ import numpy as np
 from nmm.base.arrays import Array, Flags, Integers
 from nmm.base.errors import InputError, no_such
 from nmm.base.findings import Finding
-from nmm.ros.frames import Edge, Way, bare, fixed_frames, prefixed, reference
-from nmm.ros.reading import planar_rows
-from nmm.ros.recorded import Recorded
-from nmm.ros.tracks import Track, foretold, jumps_of, poses_at, steps_of
+from nmm.plugins.robot.ros.frames import Edge, Way, bare, fixed_frames, prefixed, reference
+from nmm.plugins.robot.ros.reading import planar_rows
+from nmm.plugins.robot.ros.recorded import Recorded
+from nmm.plugins.robot.ros.tracks import Track, foretold, jumps_of, poses_at, steps_of
 
 #: A correction that is dated farther ahead than this, ns, is stamped by another clock.
 AHEAD = 10_000_000_000

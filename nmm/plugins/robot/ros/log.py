@@ -14,9 +14,9 @@ from nmm.base.arrays import Array, scalar
 from nmm.base.errors import InputError, expect, few
 from nmm.base.files import replaceable, whole_file, written_at
 from nmm.model.robots.configuration import Configuration
-from nmm.ros.description import description
-from nmm.ros.links import Links
-from nmm.ros.making import Messages
+from nmm.plugins.robot.ros.description import description
+from nmm.plugins.robot.ros.links import Links
+from nmm.plugins.robot.ros.making import Messages
 from nmm.views.playback.placements import position_and_quaternion, rolling_joints
 from nmm.views.playback.rolling import Rolling
 

@@ -8,9 +8,9 @@ from collections import Counter
 from nmm.base.arrays import Array, positive, scalar
 from nmm.control.controller import Controller
 from nmm.control.goal import norms, unit_codes
-from nmm.runs.far_limits import FarLimits
-from nmm.runs.loop_log import LoopFindings
-from nmm.runs.measured_state import Jump, Refused
+from nmm.plugins.robot.far_limits import FarLimits
+from nmm.plugins.robot.loop_log import LoopFindings
+from nmm.plugins.robot.measured_state import Jump, Refused
 
 #: Of its rate the task gets less than that share for so long, s: distances block the robot.
 BLOCKED, BLOCKED_FOR = 0.1, 0.5

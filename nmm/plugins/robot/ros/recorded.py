@@ -14,12 +14,12 @@ from nmm.base.arrays import vector
 from nmm.base.errors import InputError, expect
 from nmm.base.findings import Finding
 from nmm.model.robots.robot import Robot
-from nmm.ros import reading
-from nmm.ros.frames import Edge, Tree, carried, reference
-from nmm.ros.joint_states import parts, timed_joints
-from nmm.ros.reading import plain
-from nmm.ros.storage import Log, Topic
-from nmm.ros.tracks import Track
+from nmm.plugins.robot.ros import reading
+from nmm.plugins.robot.ros.frames import Edge, Tree, carried, reference
+from nmm.plugins.robot.ros.joint_states import parts, timed_joints
+from nmm.plugins.robot.ros.reading import plain
+from nmm.plugins.robot.ros.storage import Log, Topic
+from nmm.plugins.robot.ros.tracks import Track
 
 JOINT_STATE, ODOMETRY = "sensor_msgs/msg/JointState", "nav_msgs/msg/Odometry"
 #: As tf2 calls it, and as tf did before.

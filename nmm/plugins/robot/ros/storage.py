@@ -10,7 +10,7 @@ from typing import Any
 from nmm.base.errors import InputError, RunError
 from nmm.base.files import expect_file
 from nmm.base.findings import Finding
-from nmm.ros.log import rosbags, typestore
+from nmm.plugins.robot.ros.log import rosbags, typestore
 
 #: A topic and the type of its messages.
 Topic = tuple[str, str]

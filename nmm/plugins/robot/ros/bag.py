@@ -16,9 +16,9 @@ from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
 from nmm.motion.trajectory import Trajectory
 from nmm.motion.verdict import Verdict
-from nmm.ros.recorded import Names, Recorded
-from nmm.ros.routes import Route, routes
-from nmm.ros.tracks import by_differences, contradict, settle
+from nmm.plugins.robot.ros.recorded import Names, Recorded
+from nmm.plugins.robot.ros.routes import Route, routes
+from nmm.plugins.robot.ros.tracks import by_differences, contradict, settle
 
 #: More samples are no bag that one looks at.
 MOST = 2_000_000

@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from nmm.base.arrays import Array
 from nmm.model.robots.robot import Robot
-from nmm.ros.making import base_joint
+from nmm.plugins.robot.ros.making import base_joint
 from nmm.views.playback.placements import Placements, position_and_quaternion
 
 #: Pinocchio's kinds of frames that are links: a file's, and those of a model made by hand.

@@ -13,9 +13,9 @@ import numpy as np
 from nmm.base.arrays import Array, Integers, vector
 from nmm.base.errors import InputError, expect
 from nmm.model.robots.robot import Robot
-from nmm.ros.making import base_joint, root_link
-from nmm.ros.reading import name_of, nanoseconds, placement, plain, planar, velocities
-from nmm.ros.tracks import Track
+from nmm.plugins.robot.ros.making import base_joint, root_link
+from nmm.plugins.robot.ros.reading import name_of, nanoseconds, placement, plain, planar, velocities
+from nmm.plugins.robot.ros.tracks import Track
 
 #: Poses that differ by less, m and rad, are the same.
 SAME = 1e-6

@@ -1,0 +1,1 @@
+from . import ros as ros
