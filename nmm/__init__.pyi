@@ -126,10 +126,10 @@ from .plugins.robot.loop_state import LoopState as LoopState
 from .plugins.robot.odometry import Odometry as Odometry
 from .plugins.robot.robot_loop import Loop as Loop
 from .plugins.robot.ros.bag import read_bag as read_bag
-from .rollouts.rollout import rollout as rollout
+from .plugins.sweeps import Sweep as Sweep
+from .plugins.sweeps.rollout import rollout as rollout
 from .scenario import Scenario as Scenario
 from .scenario.scaffold import first_scenario as first_scenario
-from .sweeps import Sweep as Sweep
 from .views import figures as figures
 from .views import folders as folders
 from .views import playback as playback

@@ -212,12 +212,12 @@ from .motion.verdict import Awaited as Awaited
 from .motion.verdict import FindingLine as FindingLine
 from .motion.verdict import Verdict as Verdict
 from .motion.verdict import verdict_of as verdict_of
-from .rollouts.rollout import Rollouts as Rollouts
+from .plugins.sweeps import SweepResult as SweepResult
+from .plugins.sweeps.rollout import Rollouts as Rollouts
 from .scenario.keys import at as at
 from .scenario.numbers import NumberList as NumberList
 from .scenario.numbers import Positive as Positive
 from .scenario.sections import Making as Making
 from .scenario.sections import Section as Section
-from .sweeps import SweepResult as SweepResult
 from .views.tables import Table as Table
 from .views.tables.table import Quantity as Quantity

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 import nmm
-from nmm.sweeps.rows import rows_of
+from nmm.plugins.sweeps.rows import rows_of
 from nmm.views.playback.channels import channels
 
 #: The paper's first case on worn wheels (its shares were measured in a physics engine, docs/sweeps.md).

@@ -25,7 +25,7 @@ from nmm.control.step.step import Step
 from nmm.motion.diagnosis.summary import RUN_NUMBERS
 from nmm.motion.table import summary_rows
 from nmm.plugins.live.running import Growing
-from nmm.sweeps.rows import MEASURED
+from nmm.plugins.sweeps.rows import MEASURED
 from nmm.views.playback.channels import channels
 from nmm.views.tables import comparison_table
 

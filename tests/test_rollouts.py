@@ -12,8 +12,8 @@ from scipy.integrate import solve_ivp
 import nmm
 from nmm.base import machine
 from nmm.model.robots.zero_order_hold import HeldInputs
-from nmm.rollouts import kept
-from nmm.rollouts.kept import least_singular_value
+from nmm.plugins.sweeps import kept
+from nmm.plugins.sweeps.kept import least_singular_value
 
 START = np.array([0.0, 0.0, 0.0, 0.5, 0.5])
 

@@ -17,7 +17,7 @@ from findings import refused
 from short_scenario import MINIMAL
 
 import nmm
-from nmm.sweeps import cluster
+from nmm.plugins.sweeps import cluster
 
 
 @pytest.fixture

@@ -24,11 +24,11 @@ from nmm.base.bundled import bundled_sweeps
 from nmm.base.errors import NOTHING
 from nmm.cli.app import app
 from nmm.cli.exit_status import status_of
-from nmm.sweeps import folder as sweep_folder
-from nmm.sweeps import rows as sweep_rows
-from nmm.sweeps.definition import SAMPLERS, Listed, Range, parsed
-from nmm.sweeps.rows import columns_of, rows_of
-from nmm.sweeps.sweep import read_sweep
+from nmm.plugins.sweeps import folder as sweep_folder
+from nmm.plugins.sweeps import rows as sweep_rows
+from nmm.plugins.sweeps.definition import SAMPLERS, Listed, Range, parsed
+from nmm.plugins.sweeps.rows import columns_of, rows_of
+from nmm.plugins.sweeps.sweep import read_sweep
 
 Command = Callable[..., Result]
 
@@ -356,7 +356,7 @@ def test_the_page_needs_nothing_from_outside(short: Path, tmp_path: Path) -> Non
 def test_a_page_of_many_rows_shows_whole_points(
     short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("nmm.sweeps.result.MOST_ROWS", 20)
+    monkeypatch.setattr("nmm.plugins.sweeps.result.MOST_ROWS", 20)
     page = vary_x(short).run(tmp_path / "out", jobs=1).page.read_text("utf-8")
     data = json.loads(page.split('id="data">')[1].split("</script>")[0])
     (index,) = (column["values"] for column in data["columns"] if column["name"] == "index")
@@ -483,7 +483,7 @@ def test_a_folder_of_another_sweep_is_refused_by_name(
         first = () if place == "vary.q0.x.upper" else VARY
         with refused(f"out: {place}", got=got):
             app(args=[*begun, *first, *options], standalone_mode=False)
-    monkeypatch.setattr("nmm.sweeps.sweep.__version__", "99.0")
+    monkeypatch.setattr("nmm.plugins.sweeps.sweep.__version__", "99.0")
     with refused("out: nmm", got="99.0"):
         app(args=[*begun, *VARY], standalone_mode=False)
     assert before == {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
@@ -532,7 +532,7 @@ def test_the_examples_of_the_page_run(tmp_path: Path, monkeypatch: pytest.Monkey
     (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
     (said,) = re.findall(r"```yaml\n(.*?)```", text, flags=re.DOTALL)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("nmm.sweeps.sweep.cores", lambda: 1)
+    monkeypatch.setattr("nmm.plugins.sweeps.sweep.cores", lambda: 1)
     names: dict[str, Any] = {"__name__": "__main__"}
     exec(code, names)
     assert names["H"].shape == (4, 2, 2)

@@ -27,7 +27,7 @@ SHIPPED = (
     "nmm.plugins.symbolic.plugin:PLUGIN",
     "nmm.plugins.live.plugin:PLUGIN",
     "nmm.plugins.robot.plugin:PLUGIN",
-    "nmm.sweeps.plugin:PLUGIN",
+    "nmm.plugins.sweeps.plugin:PLUGIN",
 )
 #: What errors call the kinds that a plugin can add.
 KINDS = ("platform", "task", "reference", "objective", "resolver")

@@ -16,8 +16,8 @@ from nmm.cli.options import SetOption, option, settings_of
 from nmm.cli.output import FAILED, OK, bar_of, complain, show_table, warn
 
 if TYPE_CHECKING:
-    from nmm.sweeps.result import SweepResult
-    from nmm.sweeps.sweep import Sweep
+    from nmm.plugins.sweeps.result import SweepResult
+    from nmm.plugins.sweeps.sweep import Sweep
 
 #: Times between two steps of the bar by which the time left is estimated, s.
 WINDOW = 300.0
@@ -104,9 +104,9 @@ def sweep(
 
 def _sweep(name: str, vary: Sequence[str], settings: dict[str, object], given: dict[str, Any]) -> Sweep:
     from nmm.base.bundled import bundled_scenarios, bundled_sweeps
+    from nmm.plugins.sweeps.definition import parsed
+    from nmm.plugins.sweeps.sweep import Sweep, is_sweep_file, read_sweep
     from nmm.scenario.scenario import SUFFIXES
-    from nmm.sweeps.definition import parsed
-    from nmm.sweeps.sweep import Sweep, is_sweep_file, read_sweep
 
     varying: dict[str, object] = {}
     for text in vary:
@@ -153,7 +153,7 @@ def _progress(made: Sweep) -> Iterator[Callable[[int], None]]:
 
 
 def _show(swept: SweepResult) -> None:
-    from nmm.sweeps.result import compared, spreads
+    from nmm.plugins.sweeps.result import compared, spreads
 
     definition = swept.definition
     rows = definition.rows

@@ -4,7 +4,7 @@ from nmm.base.plugins import Plugin
 
 PLUGIN = Plugin(
     "sweeps",
-    commands={"sweep": "nmm.cli.sweeping:sweep"},
+    commands={"sweep": "nmm.plugins.sweeps.cli:sweep"},
     after={"sweep": "torques"},
-    folders={"sweep": "nmm.sweeps.folder:is_sweep"},
+    folders={"sweep": "nmm.plugins.sweeps.folder:is_sweep"},
 )

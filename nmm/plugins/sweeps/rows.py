@@ -24,8 +24,8 @@ from nmm.base.errors import InputError, RunError
 from nmm.base.progress import Progress
 from nmm.control.step.quantities import placed
 from nmm.motion.diagnosis.summary import RUN_NUMBERS
+from nmm.plugins.sweeps.definition import Definition, Listed
 from nmm.scenario import Scenario
-from nmm.sweeps.definition import Definition, Listed
 
 if TYPE_CHECKING:
     from nmm.control.controller import Controller

@@ -11,9 +11,9 @@ from typing import Any
 
 from nmm.base.errors import InputError
 from nmm.base.files import taken, whole_file, written_at
+from nmm.plugins.sweeps.definition import Definition
+from nmm.plugins.sweeps.rows import Computed, arrow, columns_of, parquet, rows_of
 from nmm.scenario.numbers import shown
-from nmm.sweeps.definition import Definition
-from nmm.sweeps.rows import Computed, arrow, columns_of, parquet, rows_of
 from nmm.views.folders.whole import FolderKind, check_folder
 
 is_sweep = FolderKind("nmm sweep 1", "sweep.json")

@@ -17,13 +17,8 @@ from nmm.base.errors import InputError, ScenarioError, expect, expect_known
 from nmm.base.processes import as_done
 from nmm.base.progress import Progress
 from nmm.base.text_format import listed
-from nmm.scenario import Scenario
-from nmm.scenario.document import read_file
-from nmm.scenario.numbers import number
-from nmm.scenario.scenario import SUFFIXES
-from nmm.scenario.yaml_text import dotted
-from nmm.sweeps.cluster import as_done_by, cluster
-from nmm.sweeps.definition import (
+from nmm.plugins.sweeps.cluster import as_done_by, cluster
+from nmm.plugins.sweeps.definition import (
     GRID,
     KEPT,
     SAMPLERS,
@@ -34,9 +29,14 @@ from nmm.sweeps.definition import (
     check_varied,
     varied,
 )
-from nmm.sweeps.folder import SweepFolder, check_size, is_sweep
-from nmm.sweeps.result import SweepResult, write_page
-from nmm.sweeps.rows import MEASURED, computed, wholly_compiled
+from nmm.plugins.sweeps.folder import SweepFolder, check_size, is_sweep
+from nmm.plugins.sweeps.result import SweepResult, write_page
+from nmm.plugins.sweeps.rows import MEASURED, computed, wholly_compiled
+from nmm.scenario import Scenario
+from nmm.scenario.document import read_file
+from nmm.scenario.numbers import number
+from nmm.scenario.scenario import SUFFIXES
+from nmm.scenario.yaml_text import dotted
 
 #: Up to this many rows a core, threads compute them; for more, processes pay.
 FEW_ROWS = 128

@@ -29,7 +29,7 @@ from nmm.motion.recorded_run import sample_times
 from nmm.motion.recording import Recorder
 from nmm.motion.simulation import MOST_SAMPLES
 from nmm.motion.verdict import Outcome
-from nmm.rollouts.kept import MEASURES, Kept, measure
+from nmm.plugins.sweeps.kept import MEASURES, Kept, measure
 from nmm.scenario import Scenario
 
 #: Where runs start: (B, n), (n,), or by name.
@@ -45,7 +45,7 @@ class Rollouts:
     t (K,) : the samples that were kept, s
     kept : the quantities asked for by name, (B, K, ...), in a trajectory's units; not numbers (partition: -1)
         after a run's end; empty where they are in files
-    measures : (B,) by name, see `nmm.rollouts.kept.MEASURES`; not numbers for a run without a sample
+    measures : (B,) by name, see `nmm.plugins.sweeps.kept.MEASURES`; not numbers for a run without a sample
     outcome, message : (B,) how each ended: "ended" at its time, "reached" or "missed" where there is a goal,
         "singular", "diverged", "failed"; only `simulate` judges whether errors decay as expected
     samples (B,) : how many samples each has
@@ -106,7 +106,7 @@ def rollout(
     disturbances : what disturbs the runs; slip may be (B, m), and a run's noise depends on the seed and on
         the run's number; keep "believed" for what the controllers take q for by odometry
     until : a goal, at which a run ends
-    keep, every : names of what to keep (`nmm.rollouts.kept.QUANTITIES`), of each `every`-th sample
+    keep, every : names of what to keep (`nmm.plugins.sweeps.kept.QUANTITIES`), of each `every`-th sample
     folder : write what is kept there, as npz files of some runs each, instead of holding it
     threads : how many; as many as there are cores for this process when None
     progress : called with the fraction done

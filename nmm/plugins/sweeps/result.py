@@ -17,8 +17,8 @@ from nmm.base.files import whole_file
 from nmm.base.resolver_style import resolver_styles
 from nmm.base.templates import template
 from nmm.base.text_format import listed
-from nmm.sweeps.definition import Definition
-from nmm.sweeps.rows import Column, columns_of, parquet
+from nmm.plugins.sweeps.definition import Definition
+from nmm.plugins.sweeps.rows import Column, columns_of, parquet
 
 #: Quantities of all rollouts.
 QUANTITIES = (
@@ -133,7 +133,7 @@ def write_page(swept: SweepResult, units: Mapping[str, str]) -> None:
     `units` are those of columns that have none by themselves."""
     definition = swept.definition
     data = _data(swept, units)
-    text = template("nmm.sweeps", "web", "page.html").render(
+    text = template("nmm.plugins.sweeps", "web", "page.html").render(
         name=definition.name,
         title=definition.title,
         about=_about(definition),
