@@ -397,10 +397,11 @@ KINDS = ("tasks", "references", "objectives")
 
 def modules() -> list[ModuleType]:
     """All modules of the mathematics."""
-    loose = ("control.equations", "functions.program", "functions.function")
+    loose = ("control.step.equations", "control.functions.program", "control.functions.function")
     loose += ("control.controller", "control.integrators")
     names = [f"nmm.{name}" for name in loose]
-    for package in ("platforms", *(f"functions.{kind}" for kind in KINDS), "resolvers"):
+    functions = (f"control.functions.{kind}" for kind in KINDS)
+    for package in ("model.platforms", *functions, "control.resolvers"):
         found = importlib.import_module(f"nmm.{package}")
         names += [info.name for info in pkgutil.walk_packages(found.__path__, f"nmm.{package}.")]
     return [importlib.import_module(name) for name in names]

@@ -196,12 +196,12 @@ def test_legs_that_are_joined_have_it(added: None, tmp_path: Path) -> None:
 
 #: A quantity that only a step knows: what is added to each file, after which line.
 ADDED = {
-    "control/quantities.py": (
+    "control/step/quantities.py": (
         "_TABLE = (",
         'RecordedQuantity("pivot", "p", "pivot", fill=0.0, since=8, noted=True, column="pivot", place=2,'
         ' curve=Curve("pivot", "Pivot", 12), numbers=(Number("pivot_min", lambda t, x: x.min()),)),',
     ),
-    "control/recorded.py": (
+    "control/step/recorded.py": (
         "    found.objective[k] = e.H[()]",
         "    found.pivot[k] = e.answer.measure[()]",
     ),
@@ -256,7 +256,7 @@ def test_a_quantity_that_a_step_knows_is_two_files(tmp_path: Path) -> None:
 
 
 def test_one_that_nothing_writes_is_refused(tmp_path: Path) -> None:
-    ran = with_files_changed(tmp_path, ["control/quantities.py"])
+    ran = with_files_changed(tmp_path, ["control/step/quantities.py"])
     last = ran.stderr.strip().splitlines()[-1]
     assert last == "TypeError: pivot is noted of each sample, but note_sample does not write it"
 

@@ -7,7 +7,6 @@ import inspect
 import re
 from collections import Counter
 from collections.abc import Iterator
-from importlib import import_module
 from pathlib import Path
 from typing import get_args, get_origin, get_type_hints
 
@@ -20,7 +19,7 @@ from nmm.motion.recording import Recorder
 
 ROOT = Path(__file__).resolve().parent.parent
 #: Packages whose names are public; those that `nmm` or `nmm.extending` has too are listed there.
-PUBLIC = ("analysis", "scaffold", "driving", "figures", "playback", "rendering", "ros", "sweeps")
+PUBLIC = ("analysis", "driving", "figures", "playback", "rendering", "ros")
 
 
 def public_names() -> dict[str, object]:
@@ -28,7 +27,7 @@ def public_names() -> dict[str, object]:
     names = {f"nmm.{name}": getattr(nmm, name) for name in nmm.__all__}
     moved = [new.removeprefix("extending.") for new in nmm.MOVED.values() if new.startswith("extending.")]
     for room in PUBLIC:
-        module = import_module(f"nmm.{room}")
+        module = getattr(nmm, room)
         for name in module.__all__:
             if name not in nmm.__all__ and name not in moved:
                 names[f"nmm.{room}.{name}"] = getattr(module, name)

@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 IMAGES = ROOT / "docs" / "images"
 RECORD = IMAGES / "made_from.json"
 #: What draws, below `nmm/`.
-DRAWING = ("playback", "figures")
+DRAWING = ("views/playback", "views/figures")
 
 
 def content(source: str) -> str:

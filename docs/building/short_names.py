@@ -3,7 +3,7 @@
 from typing import Any
 
 #: Where public names are, in the order in which one is looked for.
-PUBLIC = ("nmm", "nmm.analysis", "nmm.playback", "nmm.figures", "nmm.driving", "nmm.plugins.sweeps")
+PUBLIC = ("nmm", "nmm.analysis", "nmm.playback", "nmm.figures", "nmm.driving", "nmm.rendering", "nmm.ros")
 
 
 def short_name(app: Any, env: Any, node: Any, contnode: Any) -> Any:

@@ -262,7 +262,7 @@ class Trajectory:
     def save(
         self, folder: str | Path, *, figures: Drawn = True, html: bool = False, ellipsoids: Wanted = False
     ) -> Path:
-        """Write the run's folder (see `nmm.views.folders.run.save`): arrays, tables, summary, figures, playback."""
+        """Write the run's folder (`nmm.views.folders.run.save`): arrays, tables, summary, figures, page."""
         return lazy_call("nmm.views.folders.run:save")(
             self, folder, figures=figures, html=html, ellipsoids=ellipsoids
         )
@@ -295,7 +295,7 @@ class Trajectory:
         return lazy_call("nmm.views.figures:overview")(self, **options)
 
     def plot_ellipses(self, path: str | Path | None = None, options: Wanted = True) -> Figure:
-        """The end-effector's path with manipulability ellipses; also as a file (`nmm.views.figures.ellipses`)."""
+        """The end-effector's path with manipulability ellipses; with a path, as a file, too."""
         return lazy_call("nmm.views.figures.ellipses:ellipses")(self, options, path)
 
     def torques(self, payload: Mapping[str, Any] | None = None) -> Torques:

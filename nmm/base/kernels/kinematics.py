@@ -1,7 +1,7 @@
 """A robot's compiled kinematics: joints, frames, their Jacobians and Hessians, the centre of mass.
 
-The same results as Pinocchio's (`nmm.model.robots.configuration`), for loops without calls from Python, in world
-axes (LOCAL_WORLD_ALIGNED). Each joint's axes are oriented so that it turns about its own z.
+The same results as Pinocchio's (`nmm.model.robots.configuration`), for loops without calls from
+Python, in world axes (LOCAL_WORLD_ALIGNED). Each joint's axes are oriented so that it turns about its own z.
 """
 
 import math
