@@ -1,5 +1,8 @@
 """What authors of platforms, tasks, resolvers and of packages above the wall need beside `nmm` itself."""
 
+from .base.arrays import Array as Array
+from .base.arrays import Integers as Integers
+from .base.arrays import positive as positive
 from .base.kernels.compiled import PLATFORM as PLATFORM
 from .base.kernels.compiled import Kernel as Kernel
 from .base.kernels.compiled import checked_by_caller as checked_by_caller

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from platform_grid import EXAMPLES, random_qp
 from robot_grid import built, frame_of, start
 
-from nmm.analysis.redundancy.null_fields import readable_null_space
-from nmm.analysis.redundancy.report import RedundancyReport, redundancy
+from nmm.analysis.null_space.null_fields import readable_null_space
+from nmm.analysis.null_space.report import RedundancyReport, redundancy
 from nmm.analysis.singular.parts import null_space
 from nmm.base.errors import InputError, SingularError
 from nmm.control.controller import Controller

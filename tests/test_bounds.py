@@ -12,7 +12,7 @@ import pytest
 from findings import refused
 
 import nmm
-from nmm.analysis.redundancy.moving import self_motion
+from nmm.analysis.null_space.moving import self_motion
 from nmm.base import machine
 from nmm.base.errors import RunError
 from nmm.cli.exit_status import status_of

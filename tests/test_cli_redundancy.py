@@ -15,8 +15,8 @@ from short_scenario import MINIMAL
 
 import nmm
 import nmm.cli.redundancy
-from nmm.analysis.redundancy.moving import self_motion
-from nmm.analysis.redundancy.report import redundancy as report_of
+from nmm.analysis.null_space.moving import self_motion
+from nmm.analysis.null_space.report import redundancy as report_of
 from nmm.base.errors import InputError, SingularError
 from nmm.cli.redundancy import direction_of, laps, redundancy
 from nmm.control.functions.tasks import Position

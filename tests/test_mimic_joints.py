@@ -19,7 +19,7 @@ from urdf_parts import inertial, joint, link, robot, write
 import nmm
 from nmm.analysis.maps.coordinates import singularity_map
 from nmm.analysis.maps.workspace import workspace_map
-from nmm.analysis.redundancy import redundancy
+from nmm.analysis.null_space import redundancy
 from nmm.analysis.singular.jacobians import Jacobians
 from nmm.analysis.singular.singularity import analyse
 from nmm.base.errors import InputError, RobotError

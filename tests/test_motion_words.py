@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from platform_grid import EXAMPLES
 from robot_grid import built, start
 
-from nmm.analysis.redundancy.motion_words import (
+from nmm.analysis.null_space.motion_words import (
     COORDINATES,
     INPUTS,
     WHO,
@@ -20,7 +20,7 @@ from nmm.analysis.redundancy.motion_words import (
     input_words,
     motion_text,
 )
-from nmm.analysis.redundancy.report import redundancy
+from nmm.analysis.null_space.report import redundancy
 from nmm.control.functions.tasks import Position
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading import load

@@ -9,7 +9,7 @@ import pytest
 from numpy import pi
 from numpy.typing import NDArray
 
-from nmm.analysis.redundancy.laps import Repeatability, repeatability
+from nmm.analysis.null_space.laps import Repeatability, repeatability
 from nmm.base.errors import InputError
 from nmm.control.controller import Controller
 from nmm.control.functions.references import (

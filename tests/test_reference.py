@@ -51,7 +51,7 @@ def test_the_reference_lists_every_public_name_once() -> None:
 
 
 #: What needs more than nmm: a browser.
-NEEDS = {"nmm.plugins.live.rendering.render": pytest.mark.browser}
+NEEDS = {"nmm.rendering.render": pytest.mark.browser}
 
 
 @pytest.mark.parametrize("name", [pytest.param(one, marks=NEEDS.get(one, ())) for one in THINGS])

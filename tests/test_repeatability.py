@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from short_scenario import scenario
 
 import nmm
-from nmm.analysis.redundancy.laps import Laps, Repeatability, repeatability
+from nmm.analysis.null_space.laps import Laps, Repeatability, repeatability
 from nmm.base.errors import InputError
 from nmm.control.controller import Controller
 from nmm.control.functions.references import Circle

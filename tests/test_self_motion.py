@@ -15,8 +15,8 @@ from robot_grid import built, frame_of, start
 from spatial_arms import UR5
 
 import nmm
-from nmm.analysis.redundancy.moving import SelfMotion, self_motion
-from nmm.analysis.redundancy.report import redundancy
+from nmm.analysis.null_space.moving import SelfMotion, self_motion
+from nmm.analysis.null_space.report import redundancy
 from nmm.base.errors import InputError, SingularError
 from nmm.control.functions.tasks import Pose, Position, Task
 from nmm.model.robots.configuration import Configuration

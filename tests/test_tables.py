@@ -18,7 +18,7 @@ from findings import refused
 from typeset import check_text
 
 import nmm
-from nmm.analysis.redundancy import repeatability
+from nmm.analysis.null_space import repeatability
 from nmm.base import latex
 from nmm.cli.exit_status import status_of
 from nmm.motion.verdict import Verdict

@@ -4,13 +4,24 @@ from typing import ClassVar
 
 import numpy as np
 
-from nmm.base.arrays import Array, Integers, positive
-from nmm.base.kernels.compiled import Kernel, kernel, scratch
-from nmm.base.kernels.linear_algebra import eliminate
-from nmm.control.resolvers.answer import RELAXED, AnswerArrays, certify
-from nmm.control.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
-from nmm.control.resolvers.problem import Dimensions
-from nmm.control.resolvers.problem_arrays import ProblemArrays
+from nmm.extending import (
+    NO_OPTIONS,
+    RELAXED,
+    RESOLVER,
+    AnswerArrays,
+    Array,
+    Dimensions,
+    Integers,
+    Kernel,
+    ProblemArrays,
+    Resolver,
+    Setup,
+    certify,
+    eliminate,
+    kernel,
+    positive,
+    scratch,
+)
 
 DAMPING = 0
 

@@ -2,11 +2,8 @@
 
 import math
 
-from nmm.base.arrays import Array
-from nmm.base.kernels.compiled import kernel
-from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
-from nmm.control.functions.function import Function, Row, Stage
-from nmm.model.robots.robot import Robot
+from nmm import Robot
+from nmm.extending import FUNCTION, Array, At, Frames, Function, Row, Rows, Stage, kernel
 
 
 @kernel(FUNCTION)

@@ -1,3 +1,4 @@
+from nmm.plugins.symbolic.from_robot import symbolic as symbolic
 from nmm.plugins.symbolic.search.descent import LocalMinimum as LocalMinimum
 from nmm.plugins.symbolic.search.family import Relation as Relation
 from nmm.plugins.symbolic.search.family import SingularFamily as SingularFamily
@@ -13,13 +14,13 @@ from .maps.result import Extreme as Extreme
 from .maps.result import Map as Map
 from .maps.singular_set import SingularSet as SingularSet
 from .maps.workspace import workspace_map as workspace_map
-from .redundancy import Laps as Laps
-from .redundancy import RedundancyReport as RedundancyReport
-from .redundancy import Repeatability as Repeatability
-from .redundancy import SelfMotion as SelfMotion
-from .redundancy import redundancy as redundancy
-from .redundancy import repeatability as repeatability
-from .redundancy import self_motion as self_motion
+from .null_space import Laps as Laps
+from .null_space import RedundancyReport as RedundancyReport
+from .null_space import Repeatability as Repeatability
+from .null_space import SelfMotion as SelfMotion
+from .null_space import redundancy as redundancy
+from .null_space import repeatability as repeatability
+from .null_space import self_motion as self_motion
 from .singular.algorithmic import ExtendedSingularity as ExtendedSingularity
 from .singular.algorithmic import PartitionSingularities as PartitionSingularities
 from .singular.along import Crossing as Crossing

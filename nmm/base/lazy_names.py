@@ -29,6 +29,7 @@ def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], 
             value = import_module(f".{name}", parent)
         else:
             value = getattr(import_module(module, parent), name)
-        return sys.modules[package].__dict__.setdefault(name, value)
+        setattr(sys.modules[package], name, value)  # also where its module is called the same
+        return value
 
     return load, lambda: [*modules], tuple(modules)

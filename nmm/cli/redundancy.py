@@ -28,9 +28,9 @@ from nmm.cli.options import (
 from nmm.cli.output import FAILED, OK, complain, print_table, progress, show_table, show_text, warn
 
 if TYPE_CHECKING:
-    from nmm.analysis.redundancy.laps import Repeatability
-    from nmm.analysis.redundancy.moving import SelfMotion
-    from nmm.analysis.redundancy.report import RedundancyReport
+    from nmm.analysis.null_space.laps import Repeatability
+    from nmm.analysis.null_space.moving import SelfMotion
+    from nmm.analysis.null_space.report import RedundancyReport
 
 #: Between samples of a self-motion, s; less for short ones.
 DT = 0.01
@@ -64,9 +64,9 @@ def redundancy(
     nmm redundancy unicycle_2r --task position --at q2=pi/3 --self-motion 0 --play
     nmm redundancy ur5_unicycle_pose --self-motion v --html self_motion.html
     """
-    from nmm.analysis.redundancy import report
-    from nmm.analysis.redundancy.moving import self_motion as moved_along
-    from nmm.analysis.redundancy.null_fields import expect_direction
+    from nmm.analysis.null_space import report
+    from nmm.analysis.null_space.moving import self_motion as moved_along
+    from nmm.analysis.null_space.null_fields import expect_direction
     from nmm.base.arrays import positive
     from nmm.cli.subjects import studied
 
@@ -181,7 +181,7 @@ def laps(
 
     The folder holds laps.png, laps.csv, summary.json and, for each resolver, a folder with its run.
     """
-    from nmm.analysis.redundancy.laps import repeatability
+    from nmm.analysis.null_space.laps import repeatability
     from nmm.scenario import Scenario
     from nmm.views.folders.laps import is_laps, save
     from nmm.views.folders.whole import check_folder

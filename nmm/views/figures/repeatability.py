@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from nmm.analysis.redundancy.laps import Laps, Repeatability
+from nmm.analysis.null_space.laps import Laps, Repeatability
 from nmm.base import resolver_style
 from nmm.base.arrays import Array
 from nmm.base.errors import expect

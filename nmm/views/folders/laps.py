@@ -13,7 +13,7 @@ from nmm.base.figure_options import PLAIN, FigureOptions
 from nmm.views.folders.whole import FolderKind, replaced_folder
 
 if TYPE_CHECKING:
-    from nmm.analysis.redundancy.laps import Repeatability
+    from nmm.analysis.null_space.laps import Repeatability
 
 is_laps = FolderKind("nmm laps 1")
 

@@ -15,7 +15,7 @@ from nmm.motion.diagnosis.summary import RUN_NUMBERS
 from nmm.views.tables.table import Quantity, Table, Value
 
 if TYPE_CHECKING:
-    from nmm.analysis.redundancy.laps import Repeatability
+    from nmm.analysis.null_space.laps import Repeatability
     from nmm.motion.trajectory import Trajectory
 
 #: Those of the summary's numbers that come first, in this order.

@@ -1,1 +1,1 @@
-from .render import render as render
+from .video import render as render

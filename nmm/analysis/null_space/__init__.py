@@ -1,8 +1,8 @@
 """What a task leaves free: degrees, words, self-motions, and whether closed paths bring the posture back."""
 
-from nmm.analysis.redundancy.laps import Laps, Repeatability, repeatability
-from nmm.analysis.redundancy.moving import SelfMotion, self_motion
-from nmm.analysis.redundancy.report import RedundancyReport, redundancy
+from nmm.analysis.null_space.laps import Laps, Repeatability, repeatability
+from nmm.analysis.null_space.moving import SelfMotion, self_motion
+from nmm.analysis.null_space.report import RedundancyReport, redundancy
 
 __all__ = [
     "Laps",

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.analysis.redundancy.motion_words import input_words, motion_text
-from nmm.analysis.redundancy.null_fields import (
+from nmm.analysis.null_space.motion_words import input_words, motion_text
+from nmm.analysis.null_space.null_fields import (
     ALONE,
     FOLLOW,
     FOLLOWED,

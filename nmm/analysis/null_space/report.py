@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.analysis.redundancy.motion_words import coordinate_words, input_words, motion_text
-from nmm.analysis.redundancy.null_fields import readable_null_space
+from nmm.analysis.null_space.motion_words import coordinate_words, input_words, motion_text
+from nmm.analysis.null_space.null_fields import readable_null_space
 from nmm.analysis.singular.jacobians import Jacobians, Subject, checked
 from nmm.analysis.singular.parts import null_space, rank_of
 from nmm.analysis.singular.singularity import TOLERANCE
