@@ -129,6 +129,7 @@ from .plugins.robot.ros.bag import read_bag as read_bag
 from .plugins.sweeps import Sweep as Sweep
 from .plugins.sweeps.rollout import rollout as rollout
 from .scenario import Scenario as Scenario
+from .scenario.scaffold import Draft as Draft
 from .scenario.scaffold import first_scenario as first_scenario
 from .views import figures as figures
 from .views import folders as folders

@@ -457,11 +457,9 @@ def test_play_ends_cleanly(run: Command, tmp_path: Path, name: str) -> None:
 
 
 def test_play_shows_a_comparison(run: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    import nmm.playback
-
     assert run("compare", "unicycle_2r_position", "--set", "duration=0.1", "--out", "two").status == 0
     shown = []
-    monkeypatch.setattr(nmm.playback, "play", lambda runs, **options: shown.append((runs, options)))
+    monkeypatch.setattr(nmm.views.playback, "play", lambda runs, **options: shown.append((runs, options)))
     assert run("play", "two", "--port", "7123", "--no-open").status == 0
     ((runs, options),) = shown
     assert [trajectory.resolver for trajectory in runs] == ["rg", "pg"]

@@ -71,9 +71,9 @@ def test_a_new_kind_gets_its_lines_in_the_lists(monkeypatch: pytest.MonkeyPatch)
     made = type("NewTask", (nmm.Heading,), {"__module__": "nmm.control.functions.tasks.new"})
     monkeypatch.setitem(TASKS.data, "new", made)
     stub = lists.STUB.read_text(encoding="utf-8")
-    line = "from .functions.tasks.new import NewTask as NewTask\n"
+    line = "from .control.functions.tasks.new import NewTask as NewTask\n"
     assert lists.stub(stub).replace(line, "") == stub
-    assert line + "from .plans.horizon import Horizon as Horizon\n" in lists.stub(stub)
+    assert line + "from .control.goal import Goal as Goal\n" in lists.stub(stub)
     page = (lists.API / "task.md").read_text(encoding="utf-8")
     entry = ".. autoclass:: nmm.NewTask\n"
     assert lists.reference(page, TASKS).replace(entry, "") == page

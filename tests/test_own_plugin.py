@@ -244,7 +244,7 @@ def test_what_of_a_plugin_fails_is_left_out(faulty: Installed) -> None:
     code = "import nmm; print(nmm.load.__module__, str(nmm.Finding('interrupted_judging'))); nmm.hollow_name"
     done = faulty.python("-c", code)
     assert done.stdout == "nmm.model.robots.loading.load interrupted while the run was judged\n"
-    assert "AttributeError: No nmm attribute hollow_name" in done.stderr
+    assert "AttributeError: nmm has no hollow_name" in done.stderr
 
 
 def test_options_folders_and_names_of_nmm_are_added(faulty: Installed) -> None:

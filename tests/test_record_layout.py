@@ -140,7 +140,7 @@ def test_the_folder_of_compiled_kernels_is_nmms_alone(monkeypatch: pytest.Monkey
     """Other users of numba in the process keep theirs, whatever is set, and nmm keeps its own."""
     kernel = Circle([0, 0], 1, 1).stages(None)[0].kernel  # type: ignore[arg-type]
     # By its place in the package: where that is installed makes no difference.
-    assert kernel.compiled.stats.cache_path == f"{cache_folder()}/functions/references"
+    assert kernel.compiled.stats.cache_path == f"{cache_folder()}/control/functions/references"
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
     theirs, ours = numba.njit(cache=True)(flat), compiled(flat)
     assert str(tmp_path) == numba.config.CACHE_DIR

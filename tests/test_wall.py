@@ -14,9 +14,11 @@ import nmm
 
 PACKAGE = Path(nmm.__file__).parent
 #: Below the wall: what makes a trajectory.
-CORE = ("nmm.base.kernels", "nmm.model", "nmm.control", "nmm.motion", "nmm.plugins.planning")
+CORE = (
+    "nmm.base.kernels", "nmm.model", "nmm.control", "nmm.motion", "nmm.plugins.planning", "nmm.plugins.robot",
+)  # fmt: skip
 #: What uses trajectories in a room that makes them.
-USER = "nmm.motion.diagnosis"
+USERS = ("nmm.motion.diagnosis", "nmm.plugins.planning.cli", "nmm.plugins.robot.cli", "nmm.plugins.robot.ros")
 #: What wings import besides, with the reason.
 EXCEPTIONS = {
     (
@@ -76,7 +78,7 @@ def below(module: str) -> bool:
     def inside(room: str) -> bool:
         return f"{module}.".startswith(f"{room}.")
 
-    return any(map(inside, CORE)) and not inside(USER)
+    return any(map(inside, CORE)) and not any(map(inside, USERS))
 
 
 def crossings() -> Iterator[tuple[str, str, str]]:

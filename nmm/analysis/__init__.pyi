@@ -1,4 +1,3 @@
-from nmm.plugins.symbolic.from_robot import symbolic as symbolic
 from nmm.plugins.symbolic.search.descent import LocalMinimum as LocalMinimum
 from nmm.plugins.symbolic.search.family import Relation as Relation
 from nmm.plugins.symbolic.search.family import SingularFamily as SingularFamily

@@ -26,7 +26,7 @@ KEPT_CACHES = 8
 under_way: dict[Path, Callable[[], None]] = {}
 
 KERNELS = Path(__file__).resolve().parent
-PACKAGE = KERNELS.parent
+PACKAGE = KERNELS.parent.parent
 
 
 @cache
