@@ -3,10 +3,11 @@
 Names are loaded when first used, so that `import nmm` costs nothing (the list is `__init__.pyi`).
 """
 
+import sys
 from importlib.util import find_spec
 
 from nmm.base.lazy_call import interrupts_wait
-from nmm.base.lazy_names import attach
+from nmm.base.lazy_names import ModuleAliases, attach
 from nmm.base.version import __version__ as __version__
 
 #: Names that authors need, which were in front before.
@@ -34,6 +35,17 @@ MOVED = {name: f"extending.{name}" for name in _EXTENDING.split()} | {
     "Velocity": "VelocityOf",
     "WeighedManipulability": "WeightedManipulability",
 }
+
+#: Modules that users import by a shorter name than their room's: `from nmm.ros import Messages`.
+SHORT = {
+    "driving": "plugins.live.driving",
+    "figures": "views.figures",
+    "folders": "views.folders",
+    "playback": "views.playback",
+    "rendering": "plugins.live.rendering",
+    "ros": "plugins.robot.ros",
+}
+sys.meta_path.append(ModuleAliases({f"nmm.{name}": f"nmm.{module}" for name, module in SHORT.items()}))
 
 _loaded, __dir__, __all__ = attach(__name__, __file__)
 

@@ -28,6 +28,7 @@ import nmm
 import nmm.cli.paper
 from nmm.base.bundled import bundled_scenarios
 from nmm.base.kinds import OBJECTIVES, PLATFORMS, REFERENCES, RESOLVERS, TASKS, Kinds
+from nmm.base.plugins import SHIPPED
 from nmm.cli.app import app
 from nmm.cli.exit_status import status_of
 from nmm.cli.paper import write
@@ -188,7 +189,12 @@ NOT_RUN = {
     "--play": "waits for a browser: tests/test_bundled_scenarios.py runs the scenarios",
 }
 #: Pages whose commands are run elsewhere.
-ELSEWHERE = {"README.md", "docs/contents.md", *(page.relative_to(ROOT).as_posix() for page in console.PAGES)}
+ELSEWHERE = {
+    "README.md",
+    "docs/contents.md",
+    "docs/own_plugin.md",
+    *(page.relative_to(ROOT).as_posix() for page in console.PAGES),
+}
 
 
 def test_the_commands_of_the_other_pages_run(
@@ -215,6 +221,8 @@ def test_the_commands_of_the_other_pages_run(
 def test_every_command_on_a_page_exists_with_its_options(page: str) -> None:
     group = typer.main.get_command(app)
     for arguments in commands((ROOT / page).read_text(encoding="utf-8")):
+        if arguments[0] == "patrol":  # the plugin's of docs/own_plugin.md: tests/test_own_plugin.py
+            continue
         with group.make_context("nmm", list(arguments)) as context:
             name, command, rest = group.resolve_command(context, list(arguments))
             assert command is not None
@@ -366,9 +374,15 @@ def test_the_table_of_rooms_is_the_order_of_the_imports() -> None:
     (rooms,) = (contract for contract in contracts if contract["name"] == "Rooms")
     stated = [sorted(layer.split(" : ")) for layer in reversed(rooms["layers"])]
     text = (ROOT / "docs" / "architecture.md").read_text("utf-8")
-    table = text[text.index("| package |") :].split("\n\n")[0].splitlines()[2:]
-    listed = [sorted(re.findall(r"`(\w+)/?`", row.split("|")[1])) for row in table]
-    assert listed == stated
+
+    def listed(heading: str) -> list[str]:
+        rows = text[text.index(f"| {heading} |") :].split("\n\n")[0].splitlines()[2:]
+        return [row.split("`")[1].removesuffix("/") for row in rows]
+
+    assert [[room] for room in [*listed("room"), "plugins"]] == stated
+    assert listed("plugin") == [
+        entry.removeprefix("nmm.").rpartition(".")[0].replace(".", "/") for entry in SHIPPED
+    ]
 
 
 def test_the_example_of_limits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,7 @@ import pytest
 from nmm.base.findings import Finding
 from nmm.base.latex import Formula, Typeset, formula, linear_formula, minor_name, symbol
 
-SUBJECTS = ("formulas", "singularities", "redundancy")
+SUBJECTS = ("plugins.symbolic.findings", "base.findings.singularities", "base.findings.redundancy")
 
 D, L = symbol("d"), symbol("l1")
 C1 = Formula("cos(q1)", r"\cos(q_1)")
@@ -528,12 +528,12 @@ EXAMPLES: dict[str, list[Any]] = {**FORMULAS, **SINGULARITIES, **REDUNDANCY}
 
 @pytest.mark.parametrize("subject", SUBJECTS)
 def test_every_code_has_an_example(subject: str) -> None:
-    table = import_module(f"nmm.base.findings.{subject}").WORDS
+    table = import_module(f"nmm.{subject}").WORDS
     assert set(table) <= set(EXAMPLES)
 
 
 def test_no_example_is_of_a_code_that_is_gone() -> None:
-    codes = {code for subject in SUBJECTS for code in import_module(f"nmm.base.findings.{subject}").WORDS}
+    codes = {code for subject in SUBJECTS for code in import_module(f"nmm.{subject}").WORDS}
     assert set(EXAMPLES) == codes
 
 

@@ -99,7 +99,7 @@ def test_colours_of_runs_are_told_apart(vision: str) -> None:
 
 def test_colours_of_runs_stand_out_from_the_page() -> None:
     # WCAG 2.2, 1.4.11: graphical objects.
-    style = resources.files("nmm.playback").joinpath("web", "style.css").read_text("utf-8")
+    style = resources.files("nmm.views.playback").joinpath("web", "style.css").read_text("utf-8")
     assert tuple(re.findall(r"--plot: (#\w+);", style)) == GROUNDS
     assert min(contrast(color, ground) for color in OF_RUNS for ground in GROUNDS) > 3.0
 

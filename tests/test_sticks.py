@@ -251,7 +251,9 @@ def test_robots_with_shapes_are_drawn_as_before(source: str, monkeypatch: pytest
     shown = [command["path"] for command in commands if command["type"] == "object"]
     assert len({path.rsplit("/", 1)[0] for path in shown}) == robot.visual_model.ngeoms
     for module in ("shapes", "extent"):
-        monkeypatch.setattr(f"nmm.playback.{module}.appearance", lambda robot: Appearance(robot.visual_model))
+        monkeypatch.setattr(
+            f"nmm.views.playback.{module}.appearance", lambda robot: Appearance(robot.visual_model)
+        )
     before = playback_scene([motion], title="", fps=10)
     assert [encode(command) for command in commands] == [encode(command) for command in before]
 

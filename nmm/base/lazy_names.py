@@ -2,9 +2,12 @@
 
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 Names = tuple[str, ...]
@@ -33,3 +36,27 @@ def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], 
         return value
 
     return load, lambda: [*modules], tuple(modules)
+
+
+class ModuleAliases(MetaPathFinder, Loader):
+    """Imports modules by a second name: `from nmm.ros import Messages`, from a room inside.
+
+    Parameters
+    ----------
+    modules : the name of the module by its second name, both in full
+    """
+
+    def __init__(self, modules: Mapping[str, str]) -> None:
+        self._modules = modules
+
+    def find_spec(self, fullname: str, path: object = None, target: object = None) -> ModuleSpec | None:
+        return ModuleSpec(fullname, self) if fullname in self._modules else None
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        module = import_module(self._modules[spec.name])
+        self._own_spec = module.__spec__
+        return module
+
+    def exec_module(self, module: ModuleType) -> None:
+        """It has run; import machinery has given it the spec of the alias."""
+        module.__spec__ = self._own_spec
