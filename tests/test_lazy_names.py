@@ -13,7 +13,11 @@ import nmm
 
 @pytest.mark.parametrize(("short", "module"), nmm.SHORT.items())
 def test_a_module_s_short_name_is_the_module(short: str, module: str) -> None:
-    code = f"import nmm.{short}, nmm.{module}, sys; print(nmm.{short} is sys.modules['nmm.{module}'], nmm.{short}.__spec__.name)"
+    code = f"""
+import sys
+import nmm.{short}, nmm.{module}
+print(nmm.{short} is sys.modules["nmm.{module}"], nmm.{short}.__spec__.name)
+"""
     for before in ("", f"import nmm.{module}\n", f"import nmm; nmm.{short}\n"):
         done = subprocess.run(
             [sys.executable, "-c", before + code], capture_output=True, text=True, check=True
