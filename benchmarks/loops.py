@@ -17,7 +17,8 @@ import numpy as np
 
 import nmm
 from nmm.control.integrators import RK4
-from nmm.motion.closed_loop import drive_loop, sample_times
+from nmm.motion.closed_loop import drive_loop
+from nmm.motion.recorded_run import sample_times
 from nmm.motion.recording import Recorder
 
 ROBOTS, ROUNDS, STAGES = 64, 5, 4
