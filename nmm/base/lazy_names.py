@@ -54,9 +54,9 @@ class ModuleAliases(MetaPathFinder, Loader):
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         module = import_module(self._modules[spec.name])
-        self._own_spec = module.__spec__
+        spec.loader_state = module.__spec__
         return module
 
     def exec_module(self, module: ModuleType) -> None:
-        """It has run; import machinery has given it the spec of the alias."""
-        module.__spec__ = self._own_spec
+        """It has run; the import has given it the alias's spec in place of its own."""
+        module.__spec__ = module.__spec__.loader_state if module.__spec__ else None
