@@ -285,9 +285,9 @@ def test_what_is_chosen_changes_the_controller(window: Window, setup: ScenarioSe
         assert kinds.input_value() == "rg"
         assert page.evaluate("nmm.camera.following")
         assert page.locator("#follow").get_attribute("aria-pressed") == "true"
-        assert page.evaluate("nmm.motion[0].color") == resolver_styles()["rg"][0]
+        assert page.evaluate("nmm.runs[0].color") == resolver_styles()["rg"][0]
         kinds.select_option("pg")
-        page.wait_for_function(f"nmm.motion[0].color === '{resolver_styles()['pg'][0]}'")
+        page.wait_for_function(f"nmm.runs[0].color === '{resolver_styles()['pg'][0]}'")
         page.locator('input[data-key="limits"]').check()
         page.wait_for_function("document.getElementById('told').textContent.match(/^t = [\\d.]+ s/)")
         page.evaluate("document.activeElement.blur()")  # the space bar is the check box's own
@@ -363,7 +363,7 @@ def test_a_second_page_shows_and_moves_the_same_robot(
             place = target(second)[0]
             first.wait_for_function(f"Math.abs(nmm.drive.targets[0].value[0] - {place}) < 1e-12")
             # It came late, and has the curves from before.
-            assert second.evaluate("nmm.motion[0].t[0]") <= first.evaluate("nmm.motion[0].t[0]") + 1e-9
+            assert second.evaluate("nmm.runs[0].t[0]") <= first.evaluate("nmm.runs[0].t[0]") + 1e-9
         page.close()
         t = first.evaluate("nmm.drive.time")
         first.wait_for_function(f"nmm.drive.time > {t}")

@@ -45,7 +45,7 @@ def test_it_grows_and_becomes_the_page_that_plays_it(window: Window) -> None:
         page = window.open(shown.url)
         assert page.locator("#status").inner_text() in ("", "0.00 of 6 s, the run begins")
         made = run()
-        page.wait_for_function("nmm.motion[0].t.length > 20")
+        page.wait_for_function("nmm.runs[0].t.length > 20")
         # What is drawn is where the run was then, and the curves end there.
         t, tree, state = page.evaluate(f"[nmm.player.time, ({WALK})(), nmm.state()]")
         k = int(np.searchsorted(made.t, t))
@@ -79,7 +79,7 @@ def test_a_camera_that_somebody_has_moved_stays_where_it_is(window: Window) -> N
     with live(scenario(60.0)) as (shown, run):
         page = window.open(shown.url)
         run()
-        page.wait_for_function("nmm.motion[0].t.length > 20")
+        page.wait_for_function("nmm.runs[0].t.length > 20")
         page.keyboard.press("x")  # without a grid
         page.mouse.move(300, 500)
         page.mouse.down()
@@ -120,7 +120,7 @@ def test_thirty_pictures_a_second_are_drawn_or_counted(window: Window, browser: 
         second = late.new_page()
         second.goto(shown.url)
         second.wait_for_function("nmm.running && nmm.running.drawn > 2", timeout=1000.0 * MOST)
-        assert second.evaluate("nmm.motion[0].t[0]") == 0.0
+        assert second.evaluate("nmm.runs[0].t[0]") == 0.0
         without_drawing(second)
         reached = page.evaluate("nmm.player.time")
         page.get_by_role("button", name="Whole run").click()

@@ -27,7 +27,7 @@ NAMES = ("RG", "PG", "EJ")
 #: As it was opened.
 AGAIN = """() => {
   nmm.player.pause();
-  nmm.motion.forEach((run) => nmm.hide(run, false));
+  nmm.runs.forEach((run) => nmm.hide(run, false));
   nmm.plots.open(nmm.plots.first);
   nmm.plots.show(true);
   nmm.plots.whole();
@@ -357,7 +357,7 @@ def test_every_axis_has_numbers_that_tell_two_values(plotted: Plotted) -> None:
         "small": "(i) => 3e-7 * Math.cos(i / 9)",
     }.items():
         page.evaluate(
-            f"""() => nmm.motion.forEach((run) => nmm.lanes.forEach((lane) => {{
+            f"""() => nmm.runs.forEach((run) => nmm.lanes.forEach((lane) => {{
               if (lane.panel !== "inputs") return;
               const column = run.columns[lane.key];
               column.values = Float32Array.from(run.t, {values});
@@ -535,7 +535,7 @@ def test_dark_and_light_follow_the_reader(plotted: Plotted) -> None:
       const canvas = document.querySelector("[data-panel=H] canvas");
       return canvas.getContext("2d").getImageData(canvas.width - 30, canvas.height - 12, 1, 1).data[0];
     }"""
-    colors = "nmm.motion.map((run) => run.color)"
+    colors = "nmm.runs.map((run) => run.color)"
     light = page.evaluate(colors)
     assert light == [resolver_styles()[name.lower()][0] for name in NAMES]
     assert page.evaluate(ground) == 255

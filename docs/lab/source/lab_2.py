@@ -42,7 +42,7 @@ def h(q):
 
 
 def PG(J, rate, h, alpha):
-    return nmm.ProjectedGradient(alpha).resolve(nmm.control.resolvers.Problem(J, rate, h)).u
+    return nmm.ProjectedGradient(alpha).resolve(nmm.Problem(J, rate, h)).u
 
 
 # %% [markdown]

@@ -17,7 +17,7 @@
     if (camera.moved) parts.push(`camera=${camera.place().map((x) => Number(x.toPrecision(6))).join(",")}`);
     if (nmm.apart.share > 0) parts.push(`apart=${Number(nmm.apart.share.toFixed(3))}`);
     for (const part of SHOWN) if (!pressed(part)) parts.push(`${part}=off`);
-    const hidden = nmm.motion.filter((run) => run.hidden).map((run) => encodeURIComponent(run.id));
+    const hidden = nmm.runs.filter((run) => run.hidden).map((run) => encodeURIComponent(run.id));
     if (hidden.length) parts.push(`hide=${hidden.join(",")}`);
     const open = plots.shown ? plots.opened() : ["none"];
     if (plots.shown !== stage.plots || (plots.shown && open.join() !== plots.first.join())) {
@@ -82,7 +82,7 @@
     address.read();
     ready = true;
     nmm.plots.listeners.push(address.changed);
-    nmm.motion.listeners.push(address.changed);
+    nmm.runs.listeners.push(address.changed);
     window.addEventListener("hashchange", () => location.hash !== written && address.read());
   };
 }

@@ -35,8 +35,8 @@
   // Set apart, a run that is hidden hides what it took along.
   function show() {
     const own = apart.share > 0;
-    for (const [, { object }] of shared()) object.visible = !(own && nmm.motion[0].hidden);
-    copies.forEach((copy, i) => (copy.visible = own && !nmm.motion[i + 1].hidden));
+    for (const [, { object }] of shared()) object.visible = !(own && nmm.runs[0].hidden);
+    copies.forEach((copy, i) => (copy.visible = own && !nmm.runs[i + 1].hidden));
   }
 
   apart.set = (share) => {
@@ -58,6 +58,6 @@
     nmm.address.changed();
   };
   apart.start = () => document.body.classList.toggle("several", nmm.motions.length > 1);
-  nmm.motion.listeners.push(show);
+  nmm.runs.listeners.push(show);
   slider.addEventListener("input", () => apart.set(Number(slider.value)));
 }

@@ -12,7 +12,7 @@
   curves.height = (lane, count) =>
     lane.key === "partition" ? ROW * Math.max(1, having(lane).length) + 6 : count > 1 ? NAME + AMONG : ALONE;
 
-  const having = (lane) => nmm.motion.filter((run) => run.columns[lane.key] && !run.hidden);
+  const having = (lane) => nmm.runs.filter((run) => run.columns[lane.key] && !run.hidden);
 
   // 1, 2 or 5 times a power of ten, of which at most about `count` fit into a width.
   curves.step = (width, count) => {

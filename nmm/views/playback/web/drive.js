@@ -123,7 +123,7 @@
       [true, "N plans the way round what is between."],
     ];
     nmm.element(panel, "p", { class: "quiet" }, ways.filter(([has]) => has).map(([, words]) => words).join(" "));
-    const run = nmm.motion[0];
+    const run = nmm.runs[0];
     axes = Object.keys(run.columns);
     empty(run);
     const upright = ([x, y, z]) => new THREE.Vector3(x, z, -y);
@@ -172,7 +172,7 @@
   }
 
   function remember(samples) {
-    const run = nmm.motion[0];
+    const run = nmm.runs[0];
     for (const [t, ...values] of samples) {
       if (run.t.length && t < run.t[run.t.length - 1]) empty(run);
       run.t.push(t);

@@ -5,7 +5,7 @@
   let shown = null;
 
   nmm.hooks.choices = ({ choices, color }) => {
-    nmm.motion[0].color = color;
+    nmm.runs[0].color = color;
     const keys = choices.map(({ key, options }) => `${key} ${options}`).join();
     if (keys !== shown) {
       shown = keys;

@@ -9,7 +9,7 @@
     part.hidden = false;
     const head = nmm.element(nmm.element(table, "thead"), "tr");
     nmm.element(head, "th", { scope: "col" }, "number");
-    for (const run of nmm.motion) nmm.element(head, "th", { scope: "col" }).append(nmm.sign("line", run.color, run.dash), run.name || "value");
+    for (const run of nmm.runs) nmm.element(head, "th", { scope: "col" }).append(nmm.sign("line", run.color, run.dash), run.name || "value");
     const body = nmm.element(table, "tbody");
     for (const label of new Set(runs.flatMap((run) => run.facts.map(([label]) => label)))) {
       const row = nmm.element(body, "tr");
@@ -19,8 +19,8 @@
       }
     }
     runs.forEach(({ events, more }, i) => {
-      for (const [time, text] of events) facts.events.push({ time, text, run: nmm.motion[i] });
-      if (more) facts.events.push({ time: events[events.length - 1][0], text: `and ${more} more`, run: nmm.motion[i] });
+      for (const [time, text] of events) facts.events.push({ time, text, run: nmm.runs[i] });
+      if (more) facts.events.push({ time: events[events.length - 1][0], text: `and ${more} more`, run: nmm.runs[i] });
     });
     facts.events.sort((a, b) => a.time - b.time);
     for (const event of facts.events) {
@@ -31,14 +31,14 @@
     }
     list.hidden = facts.events.length === 0;
     nmm.plots.first = nmm.plots.opened();
-    nmm.motion.listeners.push(() => {
-      for (const row of table.rows) nmm.motion.forEach((run, i) => (row.cells[i + 1].hidden = run.hidden));
+    nmm.runs.listeners.push(() => {
+      for (const row of table.rows) nmm.runs.forEach((run, i) => (row.cells[i + 1].hidden = run.hidden));
       for (const { run, item } of facts.events) item.hidden = run.hidden;
     });
   };
 
   facts.describe = ({ time, text, run }) =>
-    `${nmm.fixed(nmm.stage.start + time, 3)} s ${nmm.motion.length > 1 ? `${run.name}: ` : ""}${text}`;
+    `${nmm.fixed(nmm.stage.start + time, 3)} s ${nmm.runs.length > 1 ? `${run.name}: ` : ""}${text}`;
   facts.shown = () => facts.events.filter(({ run }) => !run.hidden);
 
   // What happened about a time.

@@ -123,7 +123,7 @@
   nmm.clearGhosts = (rooms) => {
     const shown = [];
     for (const { group, box, node } of all) {
-      const run = nmm.motion.find((one) => one.path === node);
+      const run = nmm.runs.find((one) => one.path === node);
       if (run && run.hidden) continue;
       const now = box.clone().translate(nmm.node(node).position);
       const free = !shown.some((one) => overlap(one, now, SHARED));

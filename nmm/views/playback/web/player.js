@@ -22,7 +22,7 @@
     if (motion.tag) nmm.scenery.tag(motion.path, motion.tag, motion.color);
     if (nmm.stage.live) return;
     const text = motion.label || "end-effector";
-    const act = (on) => nmm.hide(nmm.motion[row], !on);
+    const act = (on) => nmm.hide(nmm.runs[row], !on);
     motion.button = nmm.legend({ kind: "line", color: motion.color, text, act }).firstChild;
   };
 

@@ -105,11 +105,11 @@
   // In each header, the value of each run where the pointer is, or else at the cursor.
   function tell() {
     const time = pointed ?? nmm.player.time;
-    const places = nmm.motion.map((run) => nmm.at(run, time));
+    const places = nmm.runs.map((run) => nmm.at(run, time));
     for (const { part, lanes } of plots.panels) {
       if (!part.open) continue;
       for (const { key, values } of lanes) {
-        nmm.motion.forEach((run, i) => {
+        nmm.runs.forEach((run, i) => {
           const shown = !run.hidden && run.columns[key] !== undefined;
           if (values[i].hidden === shown) values[i].hidden = !shown;
           const text = shown ? nmm.values.text(nmm.value(run, key, places[i]), run, key, 4) : "";
@@ -144,7 +144,7 @@
   plots.opened = () => plots.ids().filter((id) => (plots.panels.find((panel) => panel.id === id)?.part ?? get(id)).open);
 
   function thinned() {
-    const [drawn, all] = ["t", "samples"].map((key) => nmm.motion.map((run) => (key === "t" ? run.t.length : run.samples)));
+    const [drawn, all] = ["t", "samples"].map((key) => nmm.runs.map((run) => (key === "t" ? run.t.length : run.samples)));
     if (drawn.every((count, i) => count === all[i])) return;
     const told = (counts) => [...new Set(counts)].map((count) => count.toLocaleString("en")).join(", ");
     get("thinned").textContent = `Drawn from ${told(drawn)} of ${told(all)} samples; extremes and events are kept.`;
@@ -179,9 +179,9 @@
           lane.aside = nmm.element(lane.row, "span", { class: "aside" });
         }
         lane.now = nmm.element(lane.row || summary, "span", { class: "now", "aria-hidden": "true" });
-        lane.values = nmm.motion.map((run) => {
+        lane.values = nmm.runs.map((run) => {
           const value = nmm.element(lane.now, "span", { hidden: "" }, " ");
-          if (nmm.motion.length > 1) value.prepend(nmm.sign("line", run.color, run.dash));
+          if (nmm.runs.length > 1) value.prepend(nmm.sign("line", run.color, run.dash));
           return value;
         });
       }
@@ -268,7 +268,7 @@
   get("closer").addEventListener("click", () => plots.closer(0.5));
   get("wider").addEventListener("click", () => plots.closer(2));
 
-  nmm.motion.listeners.push(plots.redraw);
+  nmm.runs.listeners.push(plots.redraw);
   nmm.theme.listeners.push(plots.redraw);
   new ResizeObserver(() => stack.clientWidth !== width && plots.redraw()).observe(stack);
   // Another screen may have other pixels.

@@ -15,7 +15,7 @@
     nmm.player.seek = () => {};
     nmm.plots.zoom = () => {};
     for (const key of [" ", "ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "+", "-", "0", "l", "g"]) delete nmm.keys[key];
-    const run = nmm.motion[0];
+    const run = nmm.runs[0];
     keys = Object.keys(run.columns);
     run.t = [];
     for (const key of keys) run.columns[key].values = [];
@@ -52,7 +52,7 @@
   }
 
   function remember(t, values) {
-    const run = nmm.motion[0];
+    const run = nmm.runs[0];
     const paths = keys.length + 3 * lines.length;
     const width = paths + nmm.sights.width();
     for (let i = 0; i < t.length; i++) {
@@ -71,7 +71,7 @@
   // A panel that had nothing to say at first opens once it has.
   const news = new Set(["scale", "partition"]);
   function speak() {
-    const run = nmm.motion[0];
+    const run = nmm.runs[0];
     const last = (key) => run.columns[key].values[run.t.length - 1];
     const says = {
       scale: () => keys.some((key) => key.startsWith("scale_") && last(key) < 1),
@@ -92,7 +92,7 @@
 
   nmm.hooks.run = ({ picture, t, values, partitions, told, dropped, whole }) => {
     all.hidden = !whole;
-    const run = nmm.motion[0];
+    const run = nmm.runs[0];
     run.partitions = partitions;
     remember(t, values);
     Object.assign(running, { picture, dropped });

@@ -1,10 +1,10 @@
 // The runs: which are shown, and what each of their channels is at a time. `nmm.seek` and `nmm.state` are a
 // contract, for tests and for pages that embed this one.
 "use strict";
-nmm.motion = [];
+nmm.runs = [];
 nmm.lanes = [];
 {
-  const listeners = (nmm.motion.listeners = []);
+  const listeners = (nmm.runs.listeners = []);
 
   // The last sample that is not after a time; -1 before the first.
   nmm.before = (times, time) => {
@@ -40,7 +40,7 @@ nmm.lanes = [];
   nmm.seek = (t) => nmm.stage && nmm.player.seek(t - nmm.stage.start);
   nmm.state = () => ({
     t: (nmm.stage ? nmm.stage.start : 0) + (nmm.player ? nmm.player.time : 0),
-    runs: nmm.motion.map((run) => {
+    runs: nmm.runs.map((run) => {
       const at = nmm.at(run, nmm.player.time);
       const values = Object.keys(run.columns).map((key) => [key, nmm.value(run, key, at)]);
       return { name: run.name, hidden: run.hidden, values: Object.fromEntries(values) };
@@ -62,7 +62,7 @@ nmm.lanes = [];
   nmm.hooks.curves = ({ panels, lanes, runs }) => {
     runs.forEach((run, i) => {
       const { path } = nmm.motions[i];
-      nmm.motion.push({ ...run, id: short(run.name, i), path, hidden: false, button: nmm.motions[i].button });
+      nmm.runs.push({ ...run, id: short(run.name, i), path, hidden: false, button: nmm.motions[i].button });
     });
     nmm.lanes.push(...lanes);
     nmm.plots.build(panels);

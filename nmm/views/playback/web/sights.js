@@ -167,7 +167,7 @@
   }
 
   // A run that is hidden has no picture; several have their colours.
-  const runOf = (one) => nmm.motion.find(({ path }) => path === one.of);
+  const runOf = (one) => nmm.runs.find(({ path }) => path === one.of);
   const colorOf = (one) => (nmm.motions.length > 1 && runOf(one) ? runOf(one).color : `rgb(${one.color.map((c) => Math.round(255 * c)).join(",")})`);
 
   function draw(figure, time) {
@@ -364,7 +364,7 @@
     nmm.viewer.set_dirty();
   };
   get("unsee").addEventListener("click", () => nmm.actions.image());
-  nmm.motion.listeners.push(sights.redraw);
+  nmm.runs.listeners.push(sights.redraw);
   nmm.theme.listeners.push(sights.redraw);
   window.addEventListener("resize", sights.redraw);
 }

@@ -19,7 +19,7 @@
     const table = part.querySelector("table");
     const head = nmm.element(table, "thead").appendChild(document.createElement("tr"));
     nmm.element(head, "th", { scope: "col" }, "quantity");
-    for (const run of nmm.motion) {
+    for (const run of nmm.runs) {
       const cell = nmm.element(head, "th", { scope: "col" });
       cell.append(nmm.sign("line", run.color, run.dash), run.name || "value");
     }
@@ -28,7 +28,7 @@
       const row = nmm.element(body, "tr", { "data-channel": lane.key });
       const title = nmm.element(row, "th", { scope: "row", title: nmm.curves.named(lane) }, lane.text);
       if (lane.unit) nmm.element(title, "span", { class: "unit" }, ` ${lane.unit}`);
-      const cells = nmm.motion.map(() => nmm.element(row, "td"));
+      const cells = nmm.runs.map(() => nmm.element(row, "td"));
       return { lane, cells };
     });
     // Far down or folded it costs nothing.
@@ -36,14 +36,14 @@
       seen = isIntersecting;
       values.update();
     }).observe(table);
-    nmm.motion.listeners.push(() => {
-      for (const row of table.rows) nmm.motion.forEach((run, i) => (row.cells[i + 1].hidden = run.hidden));
+    nmm.runs.listeners.push(() => {
+      for (const row of table.rows) nmm.runs.forEach((run, i) => (row.cells[i + 1].hidden = run.hidden));
     });
   };
 
   values.update = () => {
     if (!seen) return;
-    nmm.motion.forEach((run, i) => {
+    nmm.runs.forEach((run, i) => {
       if (run.hidden) return;
       const at = nmm.at(run, nmm.player.time);
       for (const { lane, cells } of rows) {
@@ -52,5 +52,5 @@
       }
     });
   };
-  nmm.motion.listeners.push(values.update);
+  nmm.runs.listeners.push(values.update);
 }
