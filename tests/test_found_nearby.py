@@ -72,6 +72,20 @@ def test_a_package_is_found_by_what_the_file_names_in_it(tmp_path: Path) -> None
     assert caught.value.findings[0].code == "package_missing"
 
 
+@pytest.mark.parametrize(("folder", "found"), [("k", True), ("k/robots", True), ("k/robots/more", False)])
+def test_a_bare_name_is_no_package_far_above(tmp_path: Path, folder: str, found: bool) -> None:
+    (tmp_path / folder).mkdir(parents=True)
+    write(tmp_path / "k/a", robot('<xacro:macro name="m"><link name="a"/></xacro:macro>', attributes=XACRO))
+    include = '<xacro:include filename="$(find k_support)/a"/><xacro:m/>'
+    path = write(tmp_path / folder / "k.xacro", robot(include, attributes=XACRO))
+    if found:
+        assert of_code(nmm.load(path).notes, "found_nearby")[0].values["place"] == str(tmp_path / "k")
+    else:
+        with pytest.raises(nmm.RobotError) as caught:
+            nmm.load(path)
+        assert [one.code for one in caught.value.findings] == ["package_missing"]
+
+
 def test_the_folder_of_a_package_by_its_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -53,8 +53,16 @@ class Packages:
         found = next(iter(self._candidates(package)), None)
         if found is None and asking is not None:
             named = re.findall(rf"\$\(find\s+{re.escape(package)}\)/([^\s\"'<>$]+)", read_text(asking))
-            above = asking.absolute().parents[:_NEAR]
-            found = next((one for one in above if any(os.path.isfile(one / tail) for tail in named)), None)
+            # A bare name is asked for nearby only: five folders up, a stranger's file may have it.
+            found = next(
+                (
+                    folder
+                    for up, folder in enumerate(asking.absolute().parents[:_NEAR])
+                    for tail in named
+                    if (up < 2 or "/" in tail) and os.path.isfile(folder / tail)
+                ),
+                None,
+            )
             if found is not None:
                 self.nearby[package] = self.found[package] = found
                 self._folders[package] = [found]
