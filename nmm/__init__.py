@@ -10,32 +10,6 @@ from nmm.base.lazy_call import interrupts_wait
 from nmm.base.lazy_names import ModuleAliases, attach
 from nmm.base.version import __version__ as __version__
 
-#: Names that authors need, which were in front before.
-_EXTENDING = """
-    AddedJoint AnswerArrays Dimensions Evaluation Event Function Kernel Layout LimitReport LiveNumbers
-    Objective PiecewisePolynomial PinocchioModels Pivot Platform ProblemArrays Quantity Residuals
-    Resolver RollingJoint Rollouts Row Semantics Setup Shape Shapes Shown Stage State SteeredAxle
-    SteeringPivot Step Table Wheel WheelDescription WheelRate
-"""
-#: Names that were in front before, and where they are now.
-MOVED = {name: f"extending.{name}" for name in _EXTENDING.split()} | {
-    "Coordinates": "LinearCoordinates",
-    "Fixed": "FixedBase",
-    "Follower": "extending.MimicJoint",
-    "Mesh": "ConvexMesh",
-    "Plane": "HalfSpace",
-    "Postures": "extending.NamedPostures",
-    "Signal": "LiveTarget",
-    "Speed": "WheelSpeed",
-    "Spin": "WheelSpin",
-    "Spins": "WeightedSpins",
-    "Square": "QuadraticTerm",
-    "Swept": "extending.SweepResult",
-    "Turn": "SteadyTurn",
-    "Velocity": "VelocityOf",
-    "WeighedManipulability": "WeightedManipulability",
-}
-
 #: Modules that users import by a shorter name than their room's: `from nmm.ros import Messages`.
 SHORT = {
     "driving": "plugins.live.driving",
@@ -51,15 +25,17 @@ _loaded, __dir__, __all__ = attach(__name__, __file__)
 
 
 def __getattr__(name: str) -> object:
-    if name in MOVED:
-        raise AttributeError(f"nmm.{name} is now nmm.{MOVED[name]}")
     with interrupts_wait():
         try:
             return _loaded(name)
-        except AttributeError:
-            if (added := _of_plugins(name)) is None:
-                raise
-            return added
+        except AttributeError as error:
+            if (added := _of_plugins(name)) is not None:
+                return added
+            from nmm import extending
+
+            if name in extending.__all__:
+                raise AttributeError(f"{error}, but nmm.extending has", name=name) from None
+            raise
 
 
 def _of_plugins(name: str) -> object:
@@ -68,5 +44,5 @@ def _of_plugins(name: str) -> object:
         return None
     from nmm.base.plugins import additions
 
-    addition = additions("front", (*__all__, *MOVED)).get(name)
+    addition = additions("front", __all__).get(name)
     return None if addition is None else addition.load()

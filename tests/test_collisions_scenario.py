@@ -52,20 +52,6 @@ def test_keys_are_the_constructors(tmp_path: Path) -> None:
     assert again.solver.scene.distance == 0.02
 
 
-def test_a_run_of_an_earlier_version_opens(tmp_path: Path) -> None:
-    scenario = written(tmp_path, f"{{self_collisions: false, obstacles: [{PILLAR}]}}")
-    scenario.run().save(tmp_path / "run")
-    file = tmp_path / "run" / "scenario.yaml"
-    text = file.read_text(encoding="utf-8")
-    file.write_text(text.replace("self_collisions:", "self:"), encoding="utf-8")
-    assert "self:" in file.read_text(encoding="utf-8")
-    kept = nmm.Trajectory.load(tmp_path / "run").scenario
-    assert kept is not None
-    assert kept["collisions"]["self_collisions"] is False
-    with pytest.raises(ScenarioError):
-        Scenario.load(file)
-
-
 def test_true_keeps_the_robot_off_itself(tmp_path: Path) -> None:
     setting = written(tmp_path, "true").controller().solver.scene
     assert setting is not None
@@ -156,7 +142,7 @@ OBSTACLES = "{obstacles: [%s]}"
     [
         ("{distance: -0.1}", "collisions.distance: expected a number from 0, got -0.1"),
         ("{distanse: 0.1}", "collisions.distanse: unknown key"),
-        ("{self: false}", "collisions.self: this key is called self_collisions now"),
+        ("{self: false}", "collisions.self: unknown key 'self'; available: srdf, self_collisions"),
         ("{band: 0.01}", "collisions.band: expected above distance"),
         ("{ignore: [[link1, nobody]]}", "collisions.ignore: unknown link, shape or obstacle 'nobody'"),
         ("{ignore: [['no*', link1]]}", "collisions.ignore: unknown link, shape or obstacle 'no*'"),

@@ -320,11 +320,6 @@ def test_an_added_task_of_the_wrong_size(tmp_path: Path) -> None:
         scenario(tmp_path, resolver=f"{{kind: ej, added_task: {added}}}").controller()
 
 
-def test_the_added_task_has_a_new_name(tmp_path: Path) -> None:
-    with refused("given.yaml: set resolver.constraint", kind=ScenarioError):
-        scenario(tmp_path, resolver="{kind: ej, constraint: {kind: coordinates, of: q1, reference: 0}}")
-
-
 def test_a_point_may_be_a_frame(robot_2r: nmm.Robot, tmp_path: Path) -> None:
     """As in Python, `Distance("ee", "link1")`."""
     task = scenario(tmp_path, task="{kind: distance, frame: ee, to: link1, reference: 0.2}").controller().task

@@ -169,7 +169,6 @@ class CollisionsPart(
 
     makes = Collisions
     beside = ("obstacles", "ignore", "srdf")
-    renamed: ClassVar[dict[str, str]] = {"self": "self_collisions"}
 
     obstacles: list[ObstaclePart] = Field(default_factory=list, description="shapes to avoid")
 

@@ -6,11 +6,10 @@ import copy
 import re
 from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import partial, reduce
 from operator import or_
-from typing import Annotated, Any, ClassVar, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -52,19 +51,6 @@ class KeyedError(ScenarioError):
         return error.placed(error.where, partial(cls, (*place, *inner)))
 
 
-_older_names: ContextVar[bool] = ContextVar("older_names", default=False)
-
-
-@contextmanager
-def older_names() -> Iterator[None]:
-    """In the block, keys may have the names that they had in earlier versions, as in an old run's folder."""
-    token = _older_names.set(True)
-    try:
-        yield
-    finally:
-        _older_names.reset(token)
-
-
 @contextmanager
 def at(*place: str | int) -> Iterator[None]:
     """Errors of the block are about this place; places nest."""
@@ -88,18 +74,11 @@ class Part(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
-    #: Keys that have another name now, by the one that older files use.
-    renamed: ClassVar[Mapping[str, str]] = {}
-
     @model_validator(mode="before")
     @classmethod
     def _known_keys(cls, data: Any) -> Any:
         if isinstance(data, Mapping):
-            if _older_names.get():
-                data = {cls.renamed.get(key, key): value for key, value in data.items()}
             for key in data:
-                if key in cls.renamed:
-                    raise KeyedError((str(key),), f"this key is called {cls.renamed[key]} now")
                 if key not in cls.model_fields:
                     hint, made = cls.unknown(str(key)), partial(KeyedError, (str(key),))
                     raise no_such("key", key, cls.known_keys(), error=made, hint=hint)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -46,8 +46,6 @@ def _partitions(value: object) -> object:
 
 class WithAddedTask(ResolverPart):
     """With a task that takes up the redundancy; in Python the controller takes it, not the resolver."""
-
-    renamed: ClassVar[dict[str, str]] = {"constraint": "added_task"}
 
     added_task: Annotated[
         TaskList | None, BeforeValidator(lambda value: None if value is None else listed(value))

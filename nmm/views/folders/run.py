@@ -98,7 +98,6 @@ def _loaded(folder: Path, robot: Robot | None) -> Trajectory:
     from nmm.motion.trajectory import Trajectory
     from nmm.motion.verdict import verdict_of
     from nmm.scenario import Scenario
-    from nmm.scenario.keys import older_names
     from nmm.views.folders.schema import ToldRun, check_arrays, read_arrays, read_checked
 
     summary, file = folder / "summary.json", folder / "trajectory.npz"
@@ -118,9 +117,8 @@ def _loaded(folder: Path, robot: Robot | None) -> Trajectory:
     obstacles = _obstacles(told.obstacles or (), found, file)
     scenario, rest = None, dict[str, Any]()
     if (folder / "scenario.yaml").exists():
-        with older_names():
-            loaded = Scenario.load(folder / "scenario.yaml")
-            scenario = loaded.resolved()
+        loaded = Scenario.load(folder / "scenario.yaml")
+        scenario = loaded.resolved()
         robot = loaded.robot() if robot is None else robot
         rest["surroundings"] = loaded.surroundings(robot)
         if told.obstacles is None:
