@@ -171,7 +171,6 @@ def opened(
     from nmm.model.robots.loading import load
     from nmm.motion.trajectory import Trajectory
     from nmm.scenario import Scenario
-    from nmm.scenario.keys import older_names
 
     path = Path(source).expanduser()
     of_scenario = is_scenario(source)
@@ -198,8 +197,7 @@ def opened(
     run = Trajectory.load(path)
     expect(len(run), source, "a run with at least one sample")
     file = path / "scenario.yaml"
-    with older_names():
-        return run, Scenario.load(file) if file.exists() else None, run.robot
+    return run, Scenario.load(file) if file.exists() else None, run.robot
 
 
 def _check_folder(source: str, path: Path) -> None:
