@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array
 from nmm.base.errors import RunError, expect_known
-from nmm.base.kernels.compiled import allocating
+from nmm.base.kernels.compiled import compiled
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.zero_order_hold import HeldInputs
 
@@ -48,15 +48,20 @@ class Integrator(ABC):
         """q at t + dt, from q and q_dot at t and the step's inputs u."""
 
 
-@allocating
-def combined(q: Array, dt: float, weights: Array, slopes: Array) -> Array:
-    """q + dt Σ weights[k] slopes[k]; the slopes are summed first, so q is rounded once."""
-    q_next = np.empty_like(q)
+@compiled
+def combine(q: Array, dt: float, weights: Array, slopes: Array, q_next: Array) -> None:
+    """q_next = q + dt Σ weights[k] slopes[k]; the slopes are summed first, so q is rounded once."""
     for i in range(q.shape[0]):
         total = 0.0
         for k in range(weights.shape[0]):
             total += weights[k] * slopes[k, i]
         q_next[i] = q[i] + dt * total
+
+
+def combined(q: Array, dt: float, weights: Array, slopes: Array) -> Array:
+    """q + dt Σ weights[k] slopes[k]."""
+    q_next = np.empty(q.shape)
+    combine(q, dt, weights, slopes, q_next)
     return q_next
 
 

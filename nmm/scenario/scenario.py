@@ -158,9 +158,6 @@ class Scenario:
         ------
         ScenarioError : what the robot does not have, or what does not fit together
         """
-        from nmm.motion.diagnosis.compile_ahead import compile_a_run_in_parallel
-
-        compile_a_run_in_parallel()  # most who have a controller made run it
         robot = self.robot()
         with self._located():
             own = self._own if self.parts.resolver.kind == OWN else None

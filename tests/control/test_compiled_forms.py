@@ -15,12 +15,11 @@ import numpy as np
 import pytest
 from function_grid import ENTRIES, TIMES, Entry, evaluated, modules, random_configuration
 from gripping import folding
-from numba.core.dispatcher import Dispatcher
 from numpy.typing import NDArray
 from paper_cases import CASES, TIP
 from platform_grid import EXAMPLES, random_qp
 
-from nmm.base.kernels.compiled import Kernel
+from nmm.base.kernels.compiled import Compiled, Kernel
 from nmm.base.kernels.record_layout import Memory, views
 from nmm.base.kernels.records import At, Frames, Rows
 from nmm.control.controller import Controller
@@ -65,7 +64,7 @@ def in_plain_python() -> Iterator[None]:
         for place, module in list(sys.modules.items()):
             if place.split(".")[0] == "nmm":
                 for name, thing in list(vars(module).items()):
-                    if isinstance(thing, Dispatcher):
+                    if isinstance(thing, Compiled):
                         patch.setattr(module, name, thing.py_func)
         yield
 
@@ -284,7 +283,7 @@ def answers() -> dict[str, Array]:
     return found
 
 
-def dispatchers() -> dict[str, Dispatcher]:
+def dispatchers() -> dict[str, Compiled]:
     """All functions of nmm that numba compiles, by module and name."""
     found = {}
     for place, module in list(sys.modules.items()):
@@ -292,7 +291,7 @@ def dispatchers() -> dict[str, Dispatcher]:
             continue
         for name, thing in vars(module).items():
             function = thing.compiled if isinstance(thing, Kernel) else thing
-            if isinstance(function, Dispatcher) and function.py_func.__module__ == place:
+            if isinstance(function, Compiled) and function.py_func.__module__ == place:
                 found[f"{place}.{name}"] = function
     return found
 
@@ -301,7 +300,7 @@ def main(folder: str) -> None:
     """In the other process: save the answers, and how often numba's cache was hit and missed."""
     np.savez(Path(folder) / "answers.npz", **answers())
     counts = {
-        name: [sum(function.stats.cache_hits.values()), sum(function.stats.cache_misses.values())]
+        name: [sum(made.read is read for made in function.entries.values()) for read in (True, False)]
         for name, function in dispatchers().items()
     }
     (Path(folder) / "cache.json").write_text(json.dumps(counts))
@@ -340,8 +339,8 @@ def test_another_process_compiles_nothing(tmp_path: Path) -> None:
 def test_a_new_controller_compiles_nothing(robot_2r: Robot, robot_3r: Robot) -> None:
     """Whatever is combined: the kernels are called through their addresses."""
     answers()
-    before = {name: len(function.signatures) for name, function in dispatchers().items()}
+    before = {name: len(function.entries) for name, function in dispatchers().items()}
     mixed = [TIP, Task(LinearCoordinates("q1"), [0.0])]
     Controller(robot_2r, mixed, ProjectedGradient(), CASES[2].objective)(0.0, np.ones(5))
     Controller(robot_3r, [TIP], ReducedGradient(), CASES[3].objective)(0.0, np.ones(6))
-    assert {name: len(function.signatures) for name, function in dispatchers().items()} == before
+    assert {name: len(function.entries) for name, function in dispatchers().items()} == before

@@ -128,7 +128,7 @@ FIRST_CALLS = """
 import gc
 import numpy as np
 from nmm.model.collisions.swept_check import Short
-from numba.core.dispatcher import Dispatcher
+from nmm.base.kernels.compiled import Compiled
 
 robot = nmm.load("unicycle_3r")
 q = robot.q({"q1": -1.0, "q2": 0.7, "q3": 0.5})
@@ -137,8 +137,8 @@ pillar = nmm.Obstacle(nmm.Box([0.3, 0.6, 1.0]), [1.8, 0.1, 0.5])
 keeps = {"limits": nmm.Limits({"platform": 2.0, "arm": 2.4}, acceleration=4.0), "dt": 0.05}
 keeps["collisions"] = nmm.Collisions(0.03, obstacles=[pillar])
 controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), retreat=RETREAT, **keeps)
-made = [one for one in gc.get_objects() if isinstance(one, Dispatcher)]
-before = [len(one.overloads) for one in made]
+made = [one for one in gc.get_objects() if isinstance(one, Compiled)]
+before = [len(one.entries) for one in made]
 for k in range(60):
     controller(0.05 * k, q)
     q = q + 0.05 * controller.solver.found.q_dot
@@ -147,7 +147,7 @@ look._lookout.slower(np.ones(robot.n_u), 0.05)
 look._brake(3.0, q, np.zeros(robot.n_u), Short(0, 0.05, 1.0, q, 1.0))
 assert look.counts.added > 0
 assert RETREAT is None or controller.solver.retreat_state.count > 1
-print([one.py_func.__name__ for one, n in zip(made, before) if len(one.overloads) > n])
+print([one.py_func.__name__ for one, n in zip(made, before) if len(one.entries) > n])
 """
 
 

@@ -5,14 +5,12 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import fields
-from typing import Any
 
 import numpy as np
 import pytest
 from findings import codes
 
 import nmm
-from nmm.base.kernels.compiled import Kernel
 from nmm.control.step.step_size import StepSize
 from nmm.motion import closed_loop
 from nmm.motion.compiled_loop import CompiledLoop
@@ -310,16 +308,3 @@ def test_errors_looked_at_are_those_of_a_step(given: str) -> None:
         step = controller.evaluate(t, q[k])
         np.testing.assert_allclose(error[k], step.error, atol=1e-12)
         np.testing.assert_allclose(rate[k], step.rate, atol=1e-12)
-
-
-def test_what_is_compiled_ahead_is_what_a_run_calls(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For arguments of other types it would be compiled again, while the run waits."""
-    asked: list[Any] = []
-    monkeypatch.setattr(
-        "nmm.motion.diagnosis.compile_ahead.compile_in_parallel", lambda *wanted: asked.extend(wanted)
-    )
-    assert nmm.Scenario.load("unicycle_2r_position", {"duration": 1.0}).run().complete
-    called = [(one.compiled, one.signature) if isinstance(one, Kernel) else one for one in asked]
-    assert len(called) > 3
-    for function, signature in called:
-        assert list(function.overloads) == [signature.args], function

@@ -21,33 +21,6 @@ CORE = (
 USERS = ("nmm.motion.diagnosis", "nmm.plugins.planning.cli", "nmm.plugins.robot.cli", "nmm.plugins.robot.ros")
 #: What wings import besides, with the reason.
 EXCEPTIONS = {
-    (
-        "nmm.base.kernels.parallel_compile",
-        "compile_in_parallel",
-    ): "what a run needs is compiled beforehand, in other processes",
-    (
-        "nmm.motion.compiled_loop",
-        "ADVANCE_SAMPLES",
-    ): "what a run needs is compiled beforehand, in other processes",
-    (
-        "nmm.motion.compiled_loop",
-        "advance_samples",
-    ): "what a run needs is compiled beforehand, in other processes",
-    ("nmm.control.step.equations", "step"): "what a run needs is compiled beforehand, in other processes",
-    ("nmm.control.functions.program", "PLACE"): "what a run needs is compiled beforehand, in other processes",
-    ("nmm.control.functions.program", "place"): "what a run needs is compiled beforehand, in other processes",
-    (
-        "nmm.model.robots.frame_path",
-        "follow_frame",
-    ): "what a run needs is compiled beforehand, in other processes",
-    (
-        "nmm.base.kernels.spectra",
-        "WRITE_SPECTRA",
-    ): "what a run needs is compiled beforehand, in other processes",
-    (
-        "nmm.base.kernels.spectra",
-        "write_spectra",
-    ): "what a run needs is compiled beforehand, in other processes",
     ("nmm.control.step.equations", "call_step"): "the linearised step, compiled",
     ("nmm.control.resolvers.partitions", "HELD"): "the linearised step holds RG's partition",
     ("nmm.control.resolvers.partitions", "MODE"): "the linearised step holds RG's partition",

@@ -173,8 +173,6 @@ class Program:
             self.first_rows.append(self._rows)
             self._stages += [(stage, self._rows) for stage in stages]
             self._rows += max((stage.rows for stage in stages), default=0)
-            for stage in stages:  # now, while others may be compiling the step (`kernels/parallel_compile`)
-                _ = stage.kernel.address
         live = [stage.live for stage, _ in self._stages]
         self.renewals = tuple(one for one in live if isinstance(one, Renewal))
         self.remembers = any(stage.remembers for stage, _ in self._stages)

@@ -6,7 +6,6 @@ import numpy as np
 
 from nmm.base.arrays import positive
 from nmm.base.errors import InputError, expect_kind, expect_known
-from nmm.base.kernels.parallel_compile import compile_in_parallel
 from nmm.base.kernels.record_layout import views
 from nmm.control.functions.function import Function, row_scales
 from nmm.control.functions.objectives.base import Objective
@@ -110,7 +109,6 @@ def lay_out(given: Given, steered: Steered | None) -> LaidOut:
     limited = limits is not None or collisions is not None
     second = given.order == 2
     code, limits_code = (accelerate, write_next_limits) if second else (compiled_step, write_limits)
-    compile_in_parallel(*([limits_code] if limited else []), code, resolver.kernel)
     rows, added_rows = task.rows(robot), added_task.rows(robot)
     weighted = () if objective is None else objective.terms_on(robot)
     functions, added = task_functions(task), task_functions(added_task)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from nmm.base.arrays import Array, positive, vector
 from nmm.base.errors import InputError, expect, expect_known
 from nmm.base.findings import Finding
-from nmm.base.kernels.compiled import Kernel
+from nmm.base.kernels.compiled import PLATFORM, Kernel, checked_by_caller
 from nmm.model.platforms.steering import SteeredAxle
 from nmm.model.platforms.wheel_layout import AddedJoint, Layout
 
@@ -227,9 +227,10 @@ class Platform(ABC):
         """G (N, n_p, p) and its derivatives by the coordinates (N, n_p, p, n_p) at N samples (N, n_p)."""
         N, n_p, p = len(qp), self.n_p, self.p
         G, G_q = np.zeros((N, n_p, p)), np.zeros((N, n_p, p, n_p))
-        kernel, parameters = self.velocity_map, self.parameters
-        for one, G_there, G_q_there in zip(np.ascontiguousarray(qp), G, G_q, strict=True):
-            kernel(one, parameters, G_there, G_q_there)
+        kernel = checked_by_caller(self.velocity_map.compiled, PLATFORM)
+        samples, parameters = (np.ascontiguousarray(part, np.float64) for part in (qp, self.parameters))
+        for k in range(N):
+            kernel(samples[k], parameters, G[k], G_q[k])
         return G, G_q
 
     def _evaluate(self, qp: ArrayLike) -> tuple[Array, Array]:

@@ -6,7 +6,7 @@ import numpy as np
 from numba import types
 
 from nmm.base.arrays import Array, Integers
-from nmm.base.kernels.compiled import allocating, call_platform, checked_by_caller, clear, compiled, scratch
+from nmm.base.kernels.compiled import call_platform, checked_by_caller, clear, compiled, scratch
 from nmm.base.kernels.linear_algebra import copied
 from nmm.base.kernels.record_layout import IntegerVector, Memory, Vector, views
 from nmm.base.kernels.velocity_map import place_mimic_joints
@@ -101,35 +101,47 @@ class HeldInputs:
 STEPS = 4
 
 
-@allocating
+@compiled
 def roll(
-    kernel: int, parameters: Array, n_p: int, p: int, q: Array, up: Array, way: float, steps: int
-) -> tuple[Array, Array]:
-    """qp (n_p,) after a way along G(qp) up by RK4, and its derivative (n_p, n_p) in the qp of the start."""
-    at, D = q[:n_p].copy(), np.eye(n_p)
-    G, G_q = np.zeros((n_p, p)), np.zeros((n_p, p, n_p))
-    slope, slopes = np.zeros(n_p), np.zeros((n_p, n_p))
+    kernel: int, parameters: Array, p: int, q: Array, up: Array, way: float, steps: int, at: Array, D: Array
+) -> None:
+    """at = qp (n_p,) after a way along G(qp) up by RK4; D (n_p, n_p) = its derivative in the first qp."""
+    n_p = at.shape[0]
+    G, G_q = scratch((n_p, p)), scratch((n_p, p, n_p))
+    first, stage, slope = scratch(n_p), scratch(n_p), scratch(n_p)
+    first_D, stage_D, slopes = scratch((n_p, n_p)), scratch((n_p, n_p)), scratch((n_p, n_p))
+    clear(slope)
+    clear(slopes)
+    for i in range(n_p):
+        at[i] = q[i]
+        for j in range(n_p):
+            D[i, j] = 1.0 if i == j else 0.0
     h = way / steps
     for _ in range(steps):
-        first, first_D = at.copy(), D.copy()
+        copied(at, first)
+        for i in range(n_p):
+            copied(D[i], first_D[i])
         for k in range(4):
             part = 0.0 if k == 0 else h if k == 3 else 0.5 * h
-            stage, stage_D = first + part * slope, first_D + part * slopes
-            G[:] = 0.0
-            G_q[:] = 0.0
-            call_platform(kernel, stage, parameters, G, G_q)
             for i in range(n_p):
-                slope[i] = 0.0
-                slopes[i] = 0.0
+                stage[i] = first[i] + part * slope[i]
+                for j in range(n_p):
+                    stage_D[i, j] = first_D[i, j] + part * slopes[i, j]
+            clear(G)
+            clear(G_q)
+            call_platform(kernel, stage, parameters, G, G_q)
+            clear(slope)
+            clear(slopes)
+            share = h / (6.0 if k == 0 or k == 3 else 3.0)
+            for i in range(n_p):
                 for j in range(p):
                     slope[i] += G[i, j] * up[j]
                     for a in range(n_p):
                         for c in range(n_p):
                             slopes[i, c] += G_q[i, j, a] * up[j] * stage_D[a, c]
-            share = h / (6.0 if k == 0 or k == 3 else 3.0)
-            at += share * slope
-            D += share * slopes
-    return at, D
+                at[i] += share * slope[i]
+                for j in range(n_p):
+                    D[i, j] += share * slopes[i, j]
 
 
 class RollingPreview:
@@ -139,7 +151,8 @@ class RollingPreview:
 
     def __init__(self, robot: Robot) -> None:
         platform = robot.platform
-        self._platform = (platform.velocity_map.address, platform.parameters, platform.n_p, platform.p)
+        self._platform = (platform.velocity_map.address, platform.parameters, platform.p)
+        self._n_p = platform.n_p
         self.up, self.rolls = np.zeros(platform.p), False
         if platform.n_p >= 3:
             body = platform.G(np.zeros(platform.n_p))[:3]
@@ -148,7 +161,8 @@ class RollingPreview:
 
     def __call__(self, q: Array, way: float) -> tuple[Array, Array]:
         """q (n,) after a way, m, and the derivative (n_p, n_p) of its platform coordinates in those of q."""
-        n_p = self._platform[2]
-        ahead = q.copy()
-        ahead[:n_p], derivative = roll(*self._platform, q, self.up, way, STEPS)
+        n_p = self._n_p
+        ahead, at, derivative = q.copy(), np.empty(n_p), np.empty((n_p, n_p))
+        roll(*self._platform, q, self.up, way, STEPS, at, derivative)
+        ahead[:n_p] = at
         return ahead, derivative
