@@ -158,6 +158,7 @@ def test_a_command_says_it_in_one_line(tmp_path: Path) -> None:
     assert line.startswith(f"numba {numba.__version__}: ")
 
 
+@pytest.mark.thorough
 def test_the_paper_by_plain_numba(tmp_path: Path) -> None:
     """The eight runs, every number of every sample.
 
