@@ -4,7 +4,7 @@ Pinocchio cannot change a joint's type. Frames keep their names; the given model
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -36,13 +36,11 @@ CHAIN_JOINTS: Head = tuple(
 _CHAIN_KINDS = (("PX",), ("PY",), ("RZ", "RUBZ"))
 
 
-@dataclass(frozen=True)
-class Rebuilt:
-    """A model of joints x, y, theta, then the others, one number each; its geometry, and what was done."""
+class Rebuilt(NamedTuple):
+    """A model of joints x, y, theta, then the others, one number each; and its geometry."""
 
     model: pin.Model
     geometries: tuple[pin.GeometryModel, ...]
-    notes: tuple[Finding, ...]
 
 
 def rebuild(
@@ -74,7 +72,7 @@ def rebuild(
     frames = _add_frames(model, plan, joints)
     copies = tuple(_geometry(model, plan, geometry, joints, frames) for geometry in geometries)
     _add_references(model, plan, joints)
-    return Rebuilt(model, copies, tuple(_notes(plan)))
+    return Rebuilt(model, copies)
 
 
 @dataclass(frozen=True)
@@ -89,15 +87,11 @@ class _Plan:
 
     @property
     def keeps_chain(self) -> bool:
-        return self.count == 3 and _is_chain(self.head)
+        return self.count == len(CHAIN) and tuple(name for name, _ in self.head) == CHAIN
 
     def moved(self, joint: int, placement: pin.SE3) -> pin.SE3:
         """The placement of something on a joint's body: what is on the root's body moves with the root."""
         return self.root * placement if joint == self.count else placement
-
-
-def _is_chain(head: Head) -> bool:
-    return tuple(name for name, _ in head) == CHAIN
 
 
 def mimic_joints_of(source: pin.Model) -> tuple[MimicJoint, ...]:
@@ -265,9 +259,10 @@ def _add_references(model: pin.Model, plan: _Plan, joints: Mapping[int, int]) ->
         model.referenceConfigurations[entry.key()] = q
 
 
-def _notes(plan: _Plan) -> list[Finding]:
-    source, count, notes = plan.source, plan.count, []
-    if count == 1 and _is_chain(plan.head):
+def joint_notes(source: pin.Model) -> list[Finding]:
+    """What `rebuild` does to the joints of a file."""
+    count, notes = replaced_joints(source), []
+    if count == 1:
         replaced = {"name": source.names[1], "kind": kind(source.joints[1])}
         notes.append(Finding("root_replaced", replaced))
     others = range(count + 1, source.njoints)

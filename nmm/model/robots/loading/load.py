@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 
 from nmm.base.errors import RobotError, expect_kind, one_or_several
 from nmm.model.platforms import Platform, platform_by_name
-from nmm.model.robots.loading.models import robot_from
+from nmm.model.robots.loading.draft import Options
 from nmm.model.robots.loading.packages import PACKAGE, package_file
-from nmm.model.robots.loading.platform_choice import Options
+from nmm.model.robots.loading.passes import robot_from
 from nmm.model.robots.loading.source import Source, read_file, read_model, source_path
 from nmm.model.robots.loading.srdf_fitting import with_srdf, with_states
 from nmm.model.robots.robot import Robot

@@ -1,7 +1,6 @@
 """Models with joints fixed at given values, and with them the joints that mimic them; collision pairs."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -11,9 +10,9 @@ from nmm.base.arrays import Array, scalar
 from nmm.base.errors import InputError, RobotError, expect_known
 from nmm.base.findings import Finding
 from nmm.base.text_format import apart, is_pattern, matching
-from nmm.model.robots.loading.chain import CHAIN, Rebuilt
+from nmm.model.robots.loading.chain import CHAIN
 from nmm.model.robots.loading.joint_kinds import is_revolute
-from nmm.model.robots.mimic_joints import MimicJoint, first_leaders, settled
+from nmm.model.robots.mimic_joints import MimicJoint, first_leaders
 from nmm.model.robots.robot import Robot
 
 # Limits are decimal fractions of angles that are none.
@@ -66,55 +65,27 @@ def add_pairs(model: pin.Model, geometry: pin.GeometryModel, split: int | None =
             geometry.addCollisionPair(pin.CollisionPair(i, j))
 
 
-@dataclass(frozen=True)
-class Locked:
-    """A model with joints fixed: those named at `values` (rad or m), and those `mimicked` with their leaders.
-    `mimic_joints` still move, each after its leader."""
-
-    rebuilt: Rebuilt
-    values: Mapping[str, float]
-    mimicked: Mapping[str, tuple[str, float]]
-    mimic_joints: tuple[MimicJoint, ...]
-
-
-def with_locked(
-    rebuilt: Rebuilt,
+def locked_values(
+    model: pin.Model,
     lock: Mapping[str, float],
     mimic_joints: Sequence[MimicJoint],
+    own: Collection[str],
     where: str,
-    own: Sequence[str] = (),
-    standing: Mapping[str, float] | None = None,
-) -> Locked:
-    """The model with joints of `lock` (see `load`) and of `standing` (no note) fixed on the body above them;
-    `RobotError` for no joint, one of the platform's `own`, and no number or one outside the limits."""
-    model = rebuilt.model
-    free = [str(name) for name in list(model.names)[1:] if name not in CHAIN]  # a fixed base has no chain
-    lock = _named(lock, [name for name in free if name not in own], mimic_joints, where)
-    values = {name: _value(name, value, free, own, where) for name, value in lock.items()}
+) -> dict[str, float]:
+    """Values by joint of `lock` (see `load`); `RobotError` for no joint, one of the platform's `own`, and no
+    number or one outside the limits."""
+    names = [str(name) for name in list(model.names)[1:]]
+    free = [name for name in names if name not in CHAIN and name not in own]  # a fixed base has no chain
+    values: dict[str, float] = {}
+    for name, value in _named(lock, free, mimic_joints, where).items():
+        expect_known("joint to lock", name, free, where, RobotError)
+        try:
+            values[name] = scalar(value, f"lock: {name}")
+        except InputError as error:
+            raise error.at(where, RobotError) from None
     for name, value in values.items():
-        _check_limits(model, name, value, where, "")
-    mimic_joints = [one for one in mimic_joints if one.joint not in lock]  # a locked joint follows none
-    # A leader that is no joint of the model is a fixed one, which stands at zero.
-    fixed = {one.leader: 0.0 for one in mimic_joints if one.leader not in free}
-    standing = {**(standing or {}), **values}
-    mimicked, moving = settled(mimic_joints, {**fixed, **standing})
-    for name, (leader, value) in mimicked.items():
-        _check_limits(model, name, value, where, f", which follows {leader}")
-    still = {**standing, **{name: value for name, (_, value) in mimicked.items()}}
-    if not still:
-        return Locked(rebuilt, {}, {}, moving)
-    q = np.zeros(model.nq)
-    ids = [model.getJointId(name) for name in still]
-    for joint, value in zip(ids, still.values(), strict=True):
-        q[model.joints[joint].idx_q] = value
-    lean, geometries = reduced(model, rebuilt.geometries, ids, q)
-    notes = [*rebuilt.notes]
-    if values:
-        notes.append(Finding("joints_locked", {"values": values}))
-    if mimicked:
-        at = {name: [leader, value] for name, (leader, value) in mimicked.items()}
-        notes.append(Finding("mimics_locked", {"values": at}))
-    return Locked(Rebuilt(lean, geometries, tuple(notes)), values, mimicked, moving)
+        check_limits(model, name, value, where, "")
+    return values
 
 
 def _named(
@@ -133,15 +104,8 @@ def _named(
     return found | {key: value for key, value in lock.items() if not is_pattern(key)}
 
 
-def _value(name: str, value: float, free: Sequence[str], own: Sequence[str], where: str) -> float:
-    expect_known("joint to lock", name, [joint for joint in free if joint not in own], where, RobotError)
-    try:
-        return scalar(value, f"lock: {name}")
-    except InputError as error:
-        raise error.at(where, RobotError) from None
-
-
-def _check_limits(model: pin.Model, name: str, value: float, where: str, more: str) -> None:
+def check_limits(model: pin.Model, name: str, value: float, where: str, more: str) -> None:
+    """`RobotError` for a joint to be fixed outside its limits; `more` says why it is fixed."""
     index = model.joints[model.getJointId(name)].idx_q
     lower, upper = float(model.lowerPositionLimit[index]), float(model.upperPositionLimit[index])
     if not lower - _SLACK <= value <= upper + _SLACK:

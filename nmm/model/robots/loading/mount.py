@@ -17,10 +17,10 @@ from nmm.base.errors import InputError, RobotError, expect_known, few
 from nmm.base.findings import Finding
 from nmm.model.platforms import FixedBase
 from nmm.model.robots.loading.chain import CHAIN, rebuild
+from nmm.model.robots.loading.draft import Options
 from nmm.model.robots.loading.load import load
 from nmm.model.robots.loading.locking import add_pairs, told_apart
-from nmm.model.robots.loading.models import robot_from
-from nmm.model.robots.loading.platform_choice import Options
+from nmm.model.robots.loading.passes import robot_from
 from nmm.model.robots.loading.provenance import loaded_parts, with_wheels_fixed
 from nmm.model.robots.loading.source import Source
 from nmm.model.robots.robot import Robot, frame_index

@@ -1,8 +1,5 @@
 """Which platform a robot gets, as asked for or as its file or wheels say, and its reference point."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
@@ -13,95 +10,58 @@ from nmm.base.findings import Finding
 from nmm.model.platforms import FixedBase, Layout, Platform, platform_by_name
 from nmm.model.platforms.recognition import AT_ROOT, Pose, recognized, reference_of
 from nmm.model.robots.loading.chain import CHAIN
-from nmm.model.robots.loading.locking import Locked
-from nmm.model.robots.loading.measured_joints import Asked, Measured
+from nmm.model.robots.loading.draft import Draft
+from nmm.model.robots.loading.measured_joints import Measured
 from nmm.model.robots.loading.measured_layout import measure_layout
 from nmm.model.robots.loading.passive_wheels import differing_radii, differing_tyres
-from nmm.model.robots.loading.source import Source
-from nmm.model.robots.loading.virtual_base import VirtualBase
 
 # How far from upright a frame's z axis may be: files write pi/2 with a few digits.
 _LEVEL = 1e-3
-#: Adds its pairs to the collision shapes on a model.
-AddPairs = Callable[[pin.Model, pin.GeometryModel], None]
 
 
-@dataclass(frozen=True)
-class Options:
-    platform: Platform | str | None = None
-    wheels: Asked = None
-    lock: Mapping[str, float] = field(default_factory=dict)
-    axle: str | ArrayLike | None = None
-    steer: Sequence[str] = ()
-    name: str | None = None
-    limits: Mapping[str, float] = field(default_factory=dict)
-    add_pairs: AddPairs | None = None
-
-
-def measured_of(made: Locked, source: Source) -> Measured:
-    """The measures of a model that is in the making."""
-    visual, collision = made.rebuilt.geometries
-    return Measured(made.rebuilt.model, (collision, visual), source.where, source.marks, source.undercarriage)
-
-
-@dataclass(frozen=True)
-class ChosenPlatform:
-    """A platform, who chose its kind, the file's wheels and joints seen from its reference point, where that
-    is in the root link, what is to be told, and where the platform is not what the file's wheels are."""
-
-    platform: Platform
-    origin: str
-    layout: Layout | None = None
-    reference: Pose = AT_ROOT
-    notes: tuple[Finding, ...] = ()
-    contradictions: tuple[Finding, ...] = ()
-
-    @property
-    def remarks(self) -> tuple[Finding, ...]:
-        return (*self.notes, *self.contradictions)
-
-
-def choose_platform(
-    made: Locked, source: Source, options: Options, base: VirtualBase | None
-) -> ChosenPlatform:
-    """`RobotError` for a platform that does not fit, and wheels that leave open how they drive."""
-    kind: Platform | str | None = source.platform if options.platform is None else options.platform
-    origin = "file" if options.platform is None else "given"
-    if is_fixed_base(source, options):
-        return ChosenPlatform(FixedBase(), origin)  # there is nothing to measure
-    measured = measured_of(made, source)
+def choose_platform(draft: Draft) -> Pose:
+    """Choose and measure the draft's platform; returns where its reference point is in the root link.
+    `RobotError` for one that does not fit, and wheels that leave open how they drive."""
+    options, kind = draft.options, draft.asked_platform
+    draft.origin = "base" if draft.gantry else "file" if options.platform is None else "given"
+    if draft.is_fixed_base:
+        draft.platform = FixedBase()
+        return AT_ROOT  # there is nothing to measure
+    measured = draft.measured()
     layout = measure_layout(measured, options.wheels, options.steer)
-    notes: tuple[Finding, ...] = ()
     reference = AT_ROOT
     try:
         if kind is None:
-            found = recognized(layout)
-            kind, notes, origin = found.kind, found.notes, "wheels" if found.is_told else "default"
-            if base is not None and origin == "default":
-                kind, origin = base.kind or kind, "base"
-            if origin == "default":
-                fixed, named = measured.fixed_wheels, measured.named_wheels
-                none = Finding("no_wheels", {"names": named} if named else {})
-                notes = (Finding("wheels_fixed", {"names": fixed}) if fixed else none,)
-        platform: Platform
-        if isinstance(kind, Platform):
-            platform = kind
-        else:
-            if options.axle is None:
-                reference = reference_of(layout, kind)
-                layout = layout.moved(*reference) if reference != AT_ROOT else layout
-            platform = platform_by_name(kind).fit(layout)
-        contradictions = [*platform.compared(layout), *differing_radii(measured, options.wheels)]
+            kind = _recognized_kind(draft, measured, layout)
+        if not isinstance(kind, Platform) and options.axle is None:
+            reference = reference_of(layout, kind)
+            layout = layout.moved(*reference) if reference != AT_ROOT else layout
+        platform = kind if isinstance(kind, Platform) else platform_by_name(kind).fit(layout)
+        draft.contradictions = *platform.compared(layout), *differing_radii(measured, options.wheels)
     except InputError as error:
-        raise error.at(source.where, RobotError) from None
+        raise error.at(draft.where, RobotError) from None
     if layout.wheels and platform.lengths:
-        notes = (*notes, *differing_tyres(measured, [wheel.joint for wheel in layout.wheels]))
-    return ChosenPlatform(platform, origin, layout, reference, notes, tuple(contradictions))
+        draft.remarks += differing_tyres(measured, [wheel.joint for wheel in layout.wheels])
+    draft.remarks += draft.contradictions
+    draft.platform, draft.layout = platform, layout
+    return reference
 
 
-def is_fixed_base(source: Source, options: Options) -> bool:
-    chosen = source.platform if options.platform is None else options.platform
-    return isinstance(chosen, FixedBase) or chosen == FixedBase.name
+def _recognized_kind(draft: Draft, measured: Measured, layout: Layout) -> str:
+    """The kind of platform that the file's wheels or a base of joints tell, or the usual one."""
+    found = recognized(layout)
+    draft.remarks += found.notes
+    if found.is_told:
+        draft.origin = "wheels"
+    elif draft.base is not None:
+        draft.origin = "base"
+        return draft.base.kind or found.kind
+    else:
+        draft.origin = "default"
+        fixed, named = measured.fixed_wheels, measured.named_wheels
+        none = Finding("no_wheels", {"names": named} if named else {})
+        draft.remarks.append(Finding("wheels_fixed", {"names": fixed}) if fixed else none)
+    return found.kind
 
 
 def axle_placement(model: pin.Model, axle: str | ArrayLike, where: str) -> pin.SE3:
