@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 from nmm.base.errors import SHOWN, RobotError, few, no_such
-from nmm.base.findings.finding import Finding, Words
-from nmm.base.text_format import apart, counted, one_line, quoted, short_words
+from nmm.base.findings.finding import Finding, Words, sentence
+from nmm.base.text_format import apart, counted, one_line, short_words
 
 _PACKAGE = "package {package!r} not found (give its folder in package_dirs, --package-dir)"
 #: Why there is no mesh, by `cause`.
@@ -29,7 +29,7 @@ def placed(table: Mapping[str, Words]) -> dict[str, Words]:
     """The same, each sentence preceded by its place: the arm, the included file, the link or joint."""
 
     def write(words: Words, **given: object) -> str:
-        return _place(given) + (words.format(**given) if isinstance(words, str) else words(**given))
+        return _place(given) + sentence(words, given)
 
     return {code: partial(write, words) for code, words in table.items()}
 
@@ -47,11 +47,6 @@ def _place(given: Mapping[str, object]) -> str:
 
 def _mesh_missing(*, mesh: str, cause: str, shape: str = "", **given: object) -> str:
     return f"mesh {mesh!r}: {_CAUSES[cause].format(**given)}{_SHAPES[shape]}"
-
-
-def _package_missing(*, package: str, by: str, searched: Sequence[str] = (), **_: object) -> str:
-    looked = f"; looked in {', '.join(searched)}" if searched else ""
-    return f"{by}: {_PACKAGE.format(package=package)}{looked}"
 
 
 def _only_macros(*, name: str, macros: Mapping[str, str], **_: object) -> str:
@@ -82,14 +77,6 @@ def _lined(names: Sequence[str], lines: Mapping[str, int | str]) -> str:
     """Names with their lines, or FILE:LINE."""
     at = {name: f"line {line}" if isinstance(line, int) else line for name, line in lines.items()}
     return few([f"{name} ({at[name]})" if name in at else name for name in names])
-
-
-def _values(values: Mapping[str, float]) -> str:
-    return few([f"{name} {value:g}" for name, value in values.items()])
-
-
-def _numbers(values: Sequence[float]) -> str:
-    return ", ".join(f"{value:.3g}" for value in values)
 
 
 def _times(count: int, given: Mapping[str, object]) -> str:
@@ -132,30 +119,19 @@ WORDS = placed(
         "not_robot": "expected <robot> (URDF) or <mujoco> (MJCF) as the root element, got <{got}>",
         "mjcf_unread": "{what} is not understood, so nothing is read",
         "mjcf_included_twice": "included twice",
-        "mjcf_several_trees": lambda *, names, fused=False, **_: (
-            f"expected one robot, found {len(names)} bodies of the world that move: {few(names)}"
-            + (
-                "; if MuJoCo saved it from a URDF: its root link became the world's, which <compiler "
-                'fusestatic="false"/> in the <mujoco> of the URDF prevents'
-                if fused
-                else ""
-            )
-        ),
+        "mjcf_several_trees": "expected one robot, found {names:number} bodies of the world that move: "
+        "{names:few}{fused:if ; if MuJoCo saved it from a URDF: its root link became the world's, which "
+        '<compiler fusestatic="false"/> in the <mujoco> of the URDF prevents}',
         "mjcf_left_out": lambda *, names, lines=(), **_: (
             f"left out of the MJCF file: {_lined(names, dict(lines))}"
         ),
         "mjcf_noted": lambda *, why, names, lines, **_: f"MJCF: {_lined(names, lines)}: {why}",
         "mjcf_keyframe": "keyframe {name!r} has {got} numbers as qpos, the robot has {size}: left out",
-        "mjcf_speeds": lambda *, limits, **_: (
-            f"velocities are limited by what actuators may ask for: {_values(limits)} (rad/s, m/s)"
-        ),
-        "mjcf_efforts": lambda *, limits, **_: (
-            f"efforts are limited by what actuators give: {_values(limits)} (Nm, N)"
-        ),
-        "mjcf_controls": lambda *, ranges, **_: (
-            "actuators ask for less than the joints' limits, which are kept: "
-            + few([f"{name} from {lower:g} to {upper:g}" for name, (lower, upper) in ranges.items()])
-        ),
+        "mjcf_speeds": "velocities are limited by what actuators may ask for: {limits:few %s %g} (rad/s, "
+        "m/s)",
+        "mjcf_efforts": "efforts are limited by what actuators give: {limits:few %s %g} (Nm, N)",
+        "mjcf_controls": "actuators ask for less than the joints' limits, which are kept: "
+        "{ranges:few %s from %g to %g}",
         "beyond_bound": "more than {most:,.0f} {what}: no robot needs as many",
         "xacro_left_over": "<{element}/> is left over from xacro: left out",
         "only_macros": _only_macros,
@@ -164,7 +140,7 @@ WORDS = placed(
         "xacro_argument_missing": "xacro argument {name!r} has no default and was not given a value",
         "xacro_endless": "xacro: files or macros too deep in one another (does one include or call itself?)",
         "xacro_warned": "xacro {text}",
-        "package_missing": _package_missing,
+        "package_missing": f"{{by}}: {_PACKAGE}{{searched:if ; looked in {{searched:all}}}}",
         "found_nearby": lambda *, count, name, place, **_: (
             f"{name} leads nowhere, and was found near the file, at {place}"
             + (f"; so were {counted(count - 1, 'other')}" if count > 1 else "")
@@ -177,9 +153,7 @@ WORDS = placed(
         "name_missing": "a {kind} without a name",
         "name_twice": "two {kind}s named {name!r}",
         "name_unknown": lambda *, kind, got, available, **_: str(no_such(kind, got, available)),
-        "two_parents": lambda *, name, parents, **_: (
-            f"link {name!r} has two parents: {few([*map(repr, parents)])}"
-        ),
+        "two_parents": "link {name!r} has two parents: {parents:few %r}",
         "cycle": lambda *, links, **_: f"the links form a cycle: {_path(links)}",
         "several_roots": lambda *, roots, **_: (
             f"expected one root link, found {_COUNTS.get(len(roots), len(roots))}: {few(roots)}"
@@ -191,33 +165,22 @@ WORDS = placed(
         # ------------------------------------------------------------------ elements and attributes
         "element_missing": "<{element}> has no <{missing}>",
         "attribute_missing": "<{element}> has no {attribute}",
-        "not_numbers": lambda *, element, attribute, count, got, **_: (
-            f"<{element}> {attribute}: expected "
-            f"{f'{count} finite numbers' if count > 1 else 'a finite number'}, got {quoted(got)}"
-        ),
+        "not_numbers": "<{element}> {attribute}: expected {count:plural a finite number|{count} finite "
+        "numbers}, got {got:quoted}",
         "below_minimum": "<{element}> {attribute}: expected {minimum:g} or more, got {got:g}",
-        "negative_length": lambda *, element, attribute, got, **_: (
-            f"<{element}> {attribute}: expected lengths of 0 or more (m), got {quoted(got)}"
-        ),
-        "colour_beyond": lambda *, got, **_: f"<color> rgba: expected numbers from 0 to 1, got {quoted(got)}",
-        "shape_missing": lambda *, available, **_: (
-            f"no shape (expected <geometry> with one of {', '.join(available)})"
-        ),
+        "negative_length": "<{element}> {attribute}: expected lengths of 0 or more (m), got {got:quoted}",
+        "colour_beyond": "<color> rgba: expected numbers from 0 to 1, got {got:quoted}",
+        "shape_missing": "no shape (expected <geometry> with one of {available:all})",
         "mesh_missing": _mesh_missing,
         "mesh_unreadable": "mesh {mesh} cannot be read: {reason}",
-        "mesh_format_unknown": lambda *, mesh, available, **_: (
-            f"mesh {mesh!r}: unknown format, expected {', '.join(available)}"
-        ),
-        "joint_type_missing": lambda *, available, **_: f"no type, expected one of {', '.join(available)}",
-        "joint_helical": lambda *, kind, available, **_: (
-            f"a {kind} joint is refused: it turns and slides at once; expected one of {', '.join(available)}"
-        ),
+        "mesh_format_unknown": "mesh {mesh!r}: unknown format, expected {available:all}",
+        "joint_type_missing": "no type, expected one of {available:all}",
+        "joint_helical": "a {kind} joint is refused: it turns and slides at once; expected one of "
+        "{available:all}",
         "base_inside_tree": "a {kind} joint is refused inside the tree: it stands for the platform's x, y "
         "and theta only where it is the one movable joint on the root link's body",
-        "base_tilted": lambda *, axis, **_: (
-            "<axis> of a planar joint: expected it upright, 0 0 1, got "
-            + " ".join(f"{value:g}" for value in axis)
-        ),
+        "base_tilted": "<axis> of a planar joint: expected it upright, 0 0 1, got {axis[0]:g} {axis[1]:g} "
+        "{axis[2]:g}",
         "axis_zero": "<axis> xyz is zero: {got!r}",
         "limit_missing": "a {kind} joint needs a <limit>, this one has none",
         "limits_crossed": lambda *, lower, upper, **_: "<limit> lower {} is above upper {}".format(
@@ -242,24 +205,16 @@ WORDS = placed(
         "mass_large": "a mass of {mass:g} kg: is that meant?",
         "mass_missing": "no mass, but moments of inertia",
         "inertia_missing": "a mass of {mass:g} kg, but no moments of inertia",
-        "inertia_indefinite": lambda *, moments, **_: (
-            f"inertia is not positive definite: principal moments {_numbers(moments)} kg m^2"
-        ),
-        "inertia_impossible": lambda *, moments, **_: (
-            f"no body has this inertia: of the principal moments {_numbers(moments)} kg m^2 the largest is "
-            "above the sum of the others"
-        ),
-        "body_without_mass": lambda *, moved_by, inertial, **_: (
-            f"moves with joint {moved_by!r} and has no {'mass' if inertial else '<inertial>'}, nor has any "
-            "link fixed to it: dynamics and centre of mass leave it out"
-        ),
+        "inertia_indefinite": "inertia is not positive definite: principal moments {moments:all %.3g} kg m^2",
+        "inertia_impossible": "no body has this inertia: of the principal moments {moments:all %.3g} kg m^2 "
+        "the largest is above the sum of the others",
+        "body_without_mass": "moves with joint {moved_by!r} and has no {inertial:if mass}"
+        "{inertial:else <inertial>}, nor has any link fixed to it: dynamics and centre of mass leave it out",
         "velocity_unlimited": "no <limit>, so no limit of its velocity",
         "velocity_zero": "<limit> velocity is 0, which is taken as no limit",
         "joint_held": "<limit> lets it stand at {value:g} only (both ends are 0 unless given)",
         "limits_large": "<limit> from {lower:g} to {upper:g} rad: degrees?",
-        "rpy_large": lambda *, rpy, **_: (
-            f"<origin> rpy {' '.join(f'{angle:g}' for angle in rpy)} rad: degrees?"
-        ),
+        "rpy_large": "<origin> rpy {rpy[0]:g} {rpy[1]:g} {rpy[2]:g} rad: degrees?",
         "name_shared": "a link has that name, too: as a frame, it means the link",
     }
 )

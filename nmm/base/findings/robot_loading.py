@@ -1,10 +1,10 @@
 """What loading a robot changed, and what is odd about its wheels, platform, mimic joints and SRDF."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from nmm.base.errors import few
 from nmm.base.findings.robot_file import placed
-from nmm.base.text_format import apart, listed, quoted
+from nmm.base.text_format import apart, listed
 
 #: Why a presumed wheel joint is none, by `why`.
 NO_WHEEL = {
@@ -16,12 +16,6 @@ NO_WHEEL = {
     "joint_between": "another joint is between it and the root link ({between}); lock that to make it one",
     "swivel_carries_more": "{swivel}, on which it would swivel, carries {other} too",
 }
-
-
-def _names(words: str) -> Callable[..., str]:
-    """A sentence about `names`, possibly hundreds."""
-
-    return lambda *, names, **given: words.format(names=few(names), **given)
 
 
 def _reference_moved(*, at: Sequence[float], yaw: float, **_: object) -> str:
@@ -106,26 +100,22 @@ WORDS = placed(
     {
         # ------------------------------------------------------------------ what loading did
         "root_replaced": "root joint {name} ({kind}) replaced by x, y, theta",
-        "continuous_joints": _names("continuous joints as one unbounded angle each: {names}"),
+        "continuous_joints": "continuous joints as one unbounded angle each: {names:few}",
         "joint_added": "{name} is no joint of the file: the angle of a wheel midway between those that "
         "steer, which follow it (Ackermann)",
-        "joints_reversed": _names(
-            "axes that point down turned upwards, since a platform's angles count to the left: {names}; "
-            "angles and limits have the other sign"
-        ),
+        "joints_reversed": "axes that point down turned upwards, since a platform's angles count to the "
+        "left: {names:few}; angles and limits have the other sign",
         "reference_moved": _reference_moved,
-        "joints_locked": lambda *, values, **_: (
-            f"locked joints: {few([f'{name} at {value:g}' for name, value in values.items()])}"
-        ),
+        "joints_locked": "locked joints: {values:few %s at %g}",
         "mimics_locked": lambda *, values, **_: (
             "locked with the joint that they follow: "
             + few([f"{name} at {at:g} (follows {leader})" for name, (leader, at) in values.items()])
         ),
-        "mimic_joints": _names("joints that follow others, without an input: {names}"),
-        "mimics_of_ground": _names("turned by the ground, not by the joint that they follow: {names}"),
-        "wheels_left_out": _names("wheels that only roll, left out of q: {names}"),
-        "swivels_left_out": _names("joints that steer them or swivel, left out of q: {names}"),
-        "wheels_held": _names("wheels of a fixed base, which stand still: {names}"),
+        "mimic_joints": "joints that follow others, without an input: {names:few}",
+        "mimics_of_ground": "turned by the ground, not by the joint that they follow: {names:few}",
+        "wheels_left_out": "wheels that only roll, left out of q: {names:few}",
+        "swivels_left_out": "joints that steer them or swivel, left out of q: {names:few}",
+        "wheels_held": "wheels of a fixed base, which stand still: {names:few}",
         "not_a_wheel": lambda *, name, why, **given: (
             f"{name} stays a coordinate in spite of its name: {NO_WHEEL[why].format(**given)}"
         ),
@@ -142,21 +132,14 @@ WORDS = placed(
         ),
         "platform_recognized": _platform_recognized,
         "platform_unclear": _platform_unclear,
-        "wheels_fixed": _names(
-            "links that are called wheels do not turn in the file ({names}): its root is taken for a "
-            "unicycle, --platform for another"
-        ),
-        "no_wheels": lambda *, names=(), **_: (
-            f"no wheels in the file{f' that roll ({few(names)} cannot)' if names else ''}: its root link is "
-            "taken for a unicycle; --platform for another, --platform fixed for an arm that stands"
-        ),
-        "wheels_by_shape": _names("wheels by their shapes, not their names: {names}"),
-        "steering_held": _names("they steer, and stand still at zero: {names}"),
-        "undercarriage_held": lambda *, values, **_: (
-            "between the base and its wheels, standing still: "
-            + few([f"{name} at {value:g}" for name, value in values.items()])
-            + "; --lock NAME=VALUE for another place"
-        ),
+        "wheels_fixed": "links that are called wheels do not turn in the file ({names:few}): its root is "
+        "taken for a unicycle, --platform for another",
+        "no_wheels": "no wheels in the file{names:if  that roll ({names:few} cannot)}: its root link is "
+        "taken for a unicycle; --platform for another, --platform fixed for an arm that stands",
+        "wheels_by_shape": "wheels by their shapes, not their names: {names:few}",
+        "steering_held": "they steer, and stand still at zero: {names:few}",
+        "undercarriage_held": "between the base and its wheels, standing still: {values:few %s at %g}; "
+        "--lock NAME=VALUE for another place",
         "tyre_unclear": lambda *, name, middles, **_: (
             f"the shapes of wheel {name!r} disagree on the middle of its tyre, "
             f"{', '.join(f'{1e3 * value:.4g}' for value in middles)} mm along its axis from the joint: the "
@@ -165,20 +148,14 @@ WORDS = placed(
         "no_arm": "no arm: the platform is all that moves",
         "nothing_moves": "nothing moves",
         "collision_pairs": "{count} collision pairs: none within a body or across one joint",
-        "shapes_left_out": _names("shapes left out, their meshes are missing: {names}"),
+        "shapes_left_out": "shapes left out, their meshes are missing: {names:few}",
         "base_of_joints": _base_of_joints,
-        "accelerations_of_file": lambda *, limits, **_: (
-            "limits of acceleration in the file, which only Limits(acceleration=...) keeps, in scenarios "
-            "limits: acceleration: " + few([f"{name}: {value:g}" for name, value in limits.items()])
-        ),
-        "names_taken": lambda *, names, **_: (
-            "renamed, since the platform's coordinates or inputs have these names: "
-            + few([f"{old} is {new}" for old, new in names.items()])
-        ),
-        "gantry": _names(
-            "{names} slide all else and nothing turns it: a gantry, on platform fixed; --platform NAME "
-            '(platform="NAME") puts it on another'
-        ),
+        "accelerations_of_file": "limits of acceleration in the file, which only Limits(acceleration=...) "
+        "keeps, in scenarios limits: acceleration: {limits:few %s: %g}",
+        "names_taken": "renamed, since the platform's coordinates or inputs have these names: "
+        "{names:few %s is %s}",
+        "gantry": "{names:few} slide all else and nothing turns it: a gantry, on platform fixed; --platform "
+        'NAME (platform="NAME") puts it on another',
         "arm_mounted": lambda *, name, key, frame, base, prefix, **_: (
             f"{name} mounted{f' as {key}' if key != name else ''} at {frame} of {base}"
             f"{f', its names with the prefix {prefix}' if prefix else ''}"
@@ -222,18 +199,15 @@ WORDS = placed(
             "expected an SRDF (groups, states, pairs of links), this is "
             + ("a URDF" if got == "robot" else f"<{got}>")
         ),
-        "state_not_numbers": lambda *, name, got, **_: f"joint {name}: expected numbers, got {quoted(got)}",
-        "posture_joints_unknown": _names("posture {posture}: no such joints: {names}"),
-        "posture_of_base": _names("posture {posture}: in place of {names} are x, y, theta: left out"),
-        "groups_without_inputs": _names("groups that move by no input: {names}"),
-        "srdf_names_unknown": _names("no such links, joints or groups: {names}"),
+        "state_not_numbers": "joint {name}: expected numbers, got {got:quoted}",
+        "posture_joints_unknown": "posture {posture}: no such joints: {names:few}",
+        "posture_of_base": "posture {posture}: in place of {names:few} are x, y, theta: left out",
+        "groups_without_inputs": "groups that move by no input: {names:few}",
+        "srdf_names_unknown": "no such links, joints or groups: {names:few}",
         "virtual_joint_unused": "virtual joint {name} does not count: {child} is not the root link",
         "motion_model_differs": "virtual joint {name} has motion model {model}, unlike platform {platform}",
-        "passive_held": lambda *, values, **_: (
-            "joints without a motor have no input and are held: "
-            + few([f"{name} at {value:g}" for name, value in values.items()])
-            + " (lock for another value)"
-        ),
+        "passive_held": "joints without a motor have no input and are held: {values:few %s at %g} (lock for "
+        "another value)",
         "posture_not_one_number": "posture {posture}: {name}: expected one number, got {count}: left out",
         "posture_locked": "posture {posture}: {name} is locked at {locked:g}, not at {wanted:g}",
         "posture_follows": "posture {posture}: {name} follows {leader} ({mimic}), not at {wanted:g}",

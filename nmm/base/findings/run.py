@@ -41,19 +41,6 @@ def _replanned(plans: Sequence[Mapping[str, float]], **_: Any) -> str:
     )
 
 
-def _singular(t: float, meaning: str, lost: Sequence[str], level: int | None, **of: Any) -> str:
-    asks = f", and the task asks for what no input gives: {', '.join(lost)}" if lost else ""
-    above = (
-        f"; level {level} ({listed(of['tasks'])}) asks for what the levels above it decide; pg and dls damp "
-        "it there, ej with singular: damped"
-        if level is not None
-        else ""
-    )
-    undefined = f": {of['undefined']}" if of.get("undefined") else ""
-    platform = f"; {of['platform']}" if of.get("platform") else ""
-    return f"at t = {t:g} s: {meaning}{undefined}{asks}{above}{platform}"
-
-
 def _inputs_unmet(
     samples: int, share: float, largest: float, relative: float, t: float, scale: float = 1.0, **of: Any
 ) -> str:
@@ -80,36 +67,6 @@ def _above_decay(t: float, initial: float, errors: Sequence[Mapping[str, Any]], 
         when = "at the end" if one["t"] == end else f"at t = {one['t']:.4g} s"
         told.append(f"{one['error']:.3g} {when} (expected {one['promised']:.2g})")
     return f"the error left its expected decay at t = {t:.4g} s: {', '.join(told)}"
-
-
-def _crossed(steps: Sequence[Sequence[float]], more: int, name: str = "", **of: Any) -> str:
-    when = ", ".join(f"{before:.4g} and {after:.4g} s" for before, after in steps)
-    also = f" and in {more} more steps" if more else ""
-    said = f"J_e was singular between t = {when}{also} (its determinant changes its sign)"
-    if not name:
-        return f"{said}; the inputs go on without a jump"
-    advice = (
-        "J itself is nearly singular: dls continues" if of.get("J_too") else "singular: damped drives through"
-    )
-    return (
-        f"{said}: there {name} jumps from {of['before']:.3g} to {of['after']:.3g} {of['unit']}, and the "
-        f"motion from there on depends on where the samples fall; {advice}"
-    )
-
-
-def _unstable(t: float, rate: float, method: str, dt: float, part: bool, **of: Any) -> str:
-    said = (
-        f"{'for part of the run ' if part else ''}alpha * dt (or K * dt) is too large: at t = {t:.3g} s a "
-        f"mode of the closed loop decays with {rate:.3g} 1/s, which {method} does not follow with "
-        f"dt = {dt:g} s"
-    )
-    if "tried" not in of:
-        return said
-    tried = of["tried"]
-    return (
-        f"{said}; a dt below {tried['dt']:.3g} s follows it (tried from t = {tried['start']:g} to "
-        f"{tried['end']:g} s)"
-    )
 
 
 def _beyond(one: Mapping[str, Any]) -> str:
@@ -167,15 +124,6 @@ def _degrees(angles: Mapping[str, float], **_: Any) -> str:
     return f"the start has {listed(started)}; angles are in rad: {first:g}° is {pi}"
 
 
-def _wheels_slid(speeds: Mapping[str, float], t: float | None = None, **_: Any) -> str:
-    names = few([f"{name} (up to {speed:.3g} m/s)" for name, speed in speeds.items()])
-    at = "" if t is None else f", most at t = {t:.3g} s"
-    return (
-        f"wheels of the robot's file slid sideways{at}: {names}; is its platform what its wheels allow? "
-        "(nmm check)"
-    )
-
-
 def _tips(
     margin: float | None, edge: Sequence[str], t: float, jumps: Mapping[str, float] | None = None, **_: Any
 ) -> str:
@@ -198,28 +146,37 @@ WORDS: Mapping[str, Words] = {
     # Ready-made sentences: from a user's function, or a folder older than codes
     "said": "{text}",
     # How a run ended
-    "singular": _singular,
+    "singular": (
+        "at t = {t:g} s: {meaning}{undefined:if : {undefined}}{lost:if , and the task asks for what no input "
+        "gives: {lost:all}}{level:known ; level {level} ({tasks:and}) asks for what the levels above it "
+        "decide; pg and dls damp it there, ej with singular: damped}{platform:if ; {platform}}"
+    ),
     "diverged": "at t = {t:g} s the motion has diverged: the {what} are beyond {bound:g}",
     "failed": "{text}",
     "interrupted": "interrupted after {t:g} s of {end:g} s",
     "interrupted_judging": "interrupted while the run was judged",
     "reached": "reached at t = {t:.4g} s",
     "not_reached": "not reached in {within:.4g} s: {m:.3g} m and {rad:.3g} rad are left",
-    "nothing_to_reach": lambda never, **_: f"not reached{'' if never else ': no task was active at the end'}",
-    "task_never_began": lambda task, missing, **_: (
-        f"task {task} never began: at the end of the run, "
-        f"{', '.join(missing) or 'its conditions did not hold at one time'}"
+    "nothing_to_reach": "not reached{never:else : no task was active at the end}",
+    "task_never_began": (
+        "task {task} never began: at the end of the run, {missing:all}{missing:else its conditions did not "
+        "hold at one time}"
     ),
-    "blocked": lambda pairs, t=None, end=None, **_: (
-        f"blocked by the distance of {', '.join(pairs)}"
-        + ("" if end is None else f", from t = {t:.4g} to {end:.4g} s")
+    "blocked": "blocked by the distance of {pairs:all}{end:known , from t = {t:.4g} to {end:.4g} s}",
+    "wheels_slid": (
+        "wheels of the robot's file slid sideways{t:known , most at t = {t:.3g} s}: {speeds:few %s (up to "
+        "%.3g m/s)}; is its platform what its wheels allow? (nmm check)"
     ),
-    "wheels_slid": _wheels_slid,
     "collided": "{name} ran into each other from t = {t:.3g} s on, by up to {depth:.3g} m",
     # The error against its expected decay, and why
     "promise_left": _above_decay,
     "shorter_dt": "with dt = {shorter:.3g} s in place of {dt:g} s the error decayed as expected when tried",
-    "dt_too_long": _unstable,
+    "dt_too_long": (
+        "{part:if for part of the run }alpha * dt (or K * dt) is too large: at t = {t:.3g} s a mode of the "
+        "closed loop decays with {rate:.3g} 1/s, which {method} does not follow with dt = {dt:g} s"
+        "{tried:if ; a dt below {tried[dt]:.3g} s follows it (tried from t = {tried[start]:g} to "
+        "{tried[end]:g} s)}"
+    ),
     "rate_jumps": (
         "the rate that tasks ask for jumps {jumps} times, by up to {size:.3g} (m/s, rad/s), first at "
         "t = {t:.4g} s: the inputs follow it at {servo:g} 1/s, with bounded accelerations"
@@ -230,18 +187,14 @@ WORDS: Mapping[str, Words] = {
         "{length:.3g} m"
     ),
     "stretched": "the arm is stretched: {frame} is {away:.3g} m of {length:.3g} m from {joint}",
-    "nothing_gives": lambda lost, **_: f"no input gives: {', '.join(lost)}",
+    "nothing_gives": "no input gives: {lost:all}",
     "pose_without_feedback": (
         "no smooth feedback brings a {platform} platform to a pose x, y, theta that stands (Brockett 1983); "
         "nmm.Parking (task kind parking) and nmm.plan (scenario key plan) do"
     ),
-    "inputs_fell_short": lambda sigma=None, threshold=None, **_: (
-        "the inputs did not do all that the task asked ("
-        + (
-            "clipped, scaled or damped)"
-            if sigma is None
-            else f"damped: σ {sigma:.2g} is below {threshold:.2g})"
-        )
+    "inputs_fell_short": (
+        "the inputs did not do all that the task asked ({sigma:known damped: σ {sigma:.2g} is below "
+        "{threshold:.2g}}{sigma:unknown clipped, scaled or damped})"
     ),
     "still_moving": (
         "the robot has not come to rest: |{name}| is {mean:.3g} {unit} on average over the last "
@@ -260,7 +213,13 @@ WORDS: Mapping[str, Words] = {
         "the inputs chatter: {input} jumps back and forth between samples {jumps} times from t = {t:.4g} "
         "s to {end:.4g} s, by up to {size:.3g}"
     ),
-    "extended_jacobian_crossed": _crossed,
+    "extended_jacobian_crossed": (
+        "J_e was singular between t = {steps:all %.4g and %.4g s}{more:if  and in {more} more steps} (its "
+        "determinant changes its sign){name:else ; the inputs go on without a jump}{name:if : there {name} "
+        "jumps from {before:.3g} to {after:.3g} {unit}, and the motion from there on depends on where the "
+        "samples fall; {J_too:if J itself is nearly singular: dls continues}{J_too:else singular: damped "
+        "drives through}}"
+    ),
     "limits_binding": lambda limits, **_: (
         "limits that bind at λ < 1: "
         + ", ".join(
@@ -271,14 +230,13 @@ WORDS: Mapping[str, Words] = {
     # Warnings
     "setting_parted": "{text}",
     "python_costs": "{text}",
-    "start_outside_limits": lambda outside, recovery, **_: (
-        f"the start is outside limits: {', '.join(outside)}; what is outside comes back at {recovery:g} m/s "
-        "or rad/s"
+    "start_outside_limits": (
+        "the start is outside limits: {outside:all}; what is outside comes back at {recovery:g} m/s or rad/s"
     ),
     "start_in_degrees": _degrees,
-    "idle_inputs": lambda inputs, **_: (
-        f"without effect on task and objective: {', '.join(inputs)}; at first order nothing moves "
-        f"{'it' if len(inputs) == 1 else 'them'} (an objective can)"
+    "idle_inputs": (
+        "without effect on task and objective: {inputs:all}; at first order nothing moves "
+        "{inputs:plural it|them} (an objective can)"
     ),
     "effort_exceeded": _effort_exceeded,
     "tips": _tips,
@@ -287,9 +245,8 @@ WORDS: Mapping[str, Words] = {
         "{lost} of {taken} pictures did not come or did not show all points, for up to {gap:.3g} s at a time"
     ),
     "replanned": _replanned,
-    "not_replanned": lambda t, times, why, **_: (
-        f"the robot left its plan, and no other was made, {counted(times, 'time')} from t = {t:.4g} s on: "
-        f"{why}"
+    "not_replanned": (
+        "the robot left its plan, and no other was made, {times:count time} from t = {t:.4g} s on: {why}"
     ),
     "plan_cut": "at the end, t = {t:.4g} s, the plan that it followed goes on for {left:.3g} s more",
     "horizon_unsolved": (
@@ -303,23 +260,22 @@ WORDS: Mapping[str, Words] = {
         "{unit}/s where {recorded:.3g} {unit}/s is recorded): the inputs jump within the steps; method zoh "
         "shows what a sampled controller does"
     ),
-    "partition_singular": lambda t, inputs, automatic, **_: (
-        f"at t = {t:.3g} s the block Ja of [{', '.join(inputs)}] became singular and no other candidate was "
-        f"better: {'J itself is close to losing rank' if automatic else 'give more partitions'}"
+    "partition_singular": (
+        "at t = {t:.3g} s the block Ja of [{inputs:all}] became singular and no other candidate was better: "
+        "{automatic:if J itself is close to losing rank}{automatic:else give more partitions}"
     ),
     "nearly_singular": (
         "at t = {t:.3g} s the task Jacobian is nearly singular (condition number {condition:.2g}), nearly "
         "lost: {lost}; inputs reach {largest:.3g}"
     ),
-    "no_answer": lambda samples, t, lost_rank, **_: (
-        f"the resolver had no answer in {counted(samples, 'sample')}, from t = {t:.3g} s on, "
-        f"{'where J has lost rank' if lost_rank else 'within the limits'}: its inputs were those nearest to "
-        "rest"
+    "no_answer": (
+        "the resolver had no answer in {samples:count sample}, from t = {t:.3g} s on, {lost_rank:if where J "
+        "has lost rank}{lost_rank:else within the limits}: its inputs were those nearest to rest"
     ),
-    "limit_contradicted": lambda name, samples, t, beyond, unit, against, **_: (
-        f"the limit of {name} could not be kept with the others in {counted(samples, 'sample')}, from "
-        f"t = {t:.3g} s on: its rate was beyond what would keep it by up to {beyond:.3g} {unit}"
-        + (f" (what contradicts each other: {', '.join(against)})" if against else "")
+    "limit_contradicted": (
+        "the limit of {name} could not be kept with the others in {samples:count sample}, from t = {t:.3g} s "
+        "on: its rate was beyond what would keep it by up to {beyond:.3g} {unit}{against:if  (what "
+        "contradicts each other: {against:all})}"
     ),
     "coordinates_beyond_limits": lambda coordinates, **_: (
         f"coordinates leave their limits: {', '.join(map(_beyond, coordinates))}"
@@ -335,20 +291,17 @@ WORDS: Mapping[str, Words] = {
             for one in functions
         )
     ),
-    "backed_off": lambda times, **_: (
-        f"the error stalled and the robot backed off, at t = {', '.join(f'{t:.3g} s' for t in times)}"
-    ),
-    "added_task_missed": lambda samples, t, end, again, largest, unit, **_: (
-        f"the added task was not done in {counted(samples, 'sample')}, from t = {t:.4g} to {end:.4g} s"
-        f"{', and is done again from there on' if again else ''}: its rate was missed by up to {largest:.3g} "
-        f"{unit}"
+    "backed_off": "the error stalled and the robot backed off, at t = {times:all %.3g s}",
+    "added_task_missed": (
+        "the added task was not done in {samples:count sample}, from t = {t:.4g} to {end:.4g} s{again:if , "
+        "and is done again from there on}: its rate was missed by up to {largest:.3g} {unit}"
     ),
     "distances_note": "{text}",
     "start_too_near": _start_too_near,
     "distance_not_kept": _distance_not_kept,
-    "braked": lambda samples, in_vain, **_: (
-        f"in {counted(samples, 'sample')} the inputs went towards braking to keep distances"
-        f"{f', {in_vain} of them in vain' if in_vain else ''}"
+    "braked": (
+        "in {samples:count sample} the inputs went towards braking to keep distances{in_vain:if , {in_vain} "
+        "of them in vain}"
     ),
     "turned_back_early": "the self-motion turns back early: {text}",
 }

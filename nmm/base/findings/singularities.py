@@ -70,7 +70,7 @@ WORDS: dict[str, str | Callable[..., str]] = {
     # at a configuration
     "sizes_in_length": "singular values count lengths in L = {length:g} m",
     "sizes_mixed": "singular values count 1 m as much as 1 rad; --length L counts lengths in L",
-    "inputs_idle_here": lambda inputs: f"do not move the task here: {', '.join(inputs)}",
+    "inputs_idle_here": "do not move the task here: {inputs:all}",
     "rank_lost_here": lambda rank, rows, lost: (
         f"Singular: J has rank {rank} of {rows}. No input moves {_directions(lost)}."
     ),
@@ -86,11 +86,9 @@ WORDS: dict[str, str | Callable[..., str]] = {
     "rank_restored": lambda motions, lost, more: f"Comes back with {_rates(motions, lost, more)}.",
     "rank_restored_best": "Best together: {direction} (σ_min {rate:+.2g}).",
     "rank_not_restored": "No input brings it back, to first order.",
-    "restored_across": lambda coordinates: (
-        f"A motion along {', '.join(coordinates)} would, which the wheels do not admit."
-    ),
-    "all_minors_zero": lambda count: (
-        f"All {count} minors are 0, and det J Jᵀ with them." if count > 1 else "The only minor is 0."
+    "restored_across": "A motion along {coordinates:all} would, which the wheels do not admit.",
+    "all_minors_zero": (
+        "{count:plural The only minor is 0.|All {count} minors are 0, and det J Jᵀ with them.}"
     ),
     "some_minors_zero": _zero_minors,
     "minor_squares": ("sum of their squares {squares:.6g}, det J Jᵀ {gram:.6g} (equal: Cauchy-Binet)"),
