@@ -15,6 +15,7 @@ from findings import the, why
 
 import nmm
 from nmm.base.findings import Finding, run, words
+from nmm.base.findings.finding import sentence
 from nmm.base.findings.run import line
 from nmm.cli import runs as commands
 from nmm.motion.diagnosis.judgement import Trials
@@ -510,6 +511,40 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
         "the self-motion turns back early: steering at the limit",
     ),
 ]
+
+
+@pytest.mark.parametrize(
+    ("text", "values", "said"),
+    [
+        ("{names:all}", {"names": ["a", "b"]}, "a, b"),
+        ("{names:and}", {"names": ["a", "b", "c"]}, "a, b and c"),
+        (
+            "{names:few %r}",
+            {"names": [*"abcdefghijkl"]},
+            "'a', 'b', 'c', 'd', 'e', 'f', 'g', 'h', 'i', 'j' and 2 more",
+        ),
+        ("{at:few %s at %g}", {"at": {"q1": 0.5, "q2": 1.0}}, "q1 at 0.5, q2 at 1"),
+        ("{at:all %s from %g to %g}", {"at": {"q1": [0, 1]}}, "q1 from 0 to 1"),
+        ("{steps:all %g and %g s}", {"steps": [[0, 1], [2, 3]]}, "0 and 1 s, 2 and 3 s"),
+        ("{names:number} {names:plural name|names}", {"names": ["a"]}, "1 name"),
+        ("{n:count row}, {n:many row}, {n:plural it|them}", {"n": 0}, "0 rows, no rows, them"),
+        ("{n:count row}, {n:many row}, {n:plural it|{n} of them}", {"n": 1}, "1 row, 1 row, it"),
+        ("{got:quoted}", {"got": "a\nb"}, "'a\\nb'"),
+        ("left{x:if , {x} {y:else no} more}{x:else  alone}", {"x": 2}, "left, 2 no more"),
+        ("left{x:if , {x} more}{x:else  alone}", {}, "left alone"),
+        ("{t:known at {t:.1f} s}{t:unknown never}", {"t": 0.0}, "at 0.0 s"),
+        ("{t:known at {t:.1f} s}{t:unknown never}", {"t": None}, "never"),
+        ("{of[a]:g}", {"of": {"a": 1.0}}, "1"),
+    ],
+)
+def test_sentences(text: str, values: dict[str, Any], said: str) -> None:
+    assert sentence(text, values) == said
+
+
+@pytest.mark.parametrize("text", ["{t}", "{t:g}", "{t:all}", "{x:if {t}}"])
+def test_value_that_is_not_there(text: str) -> None:
+    with pytest.raises(KeyError):
+        sentence(text, {"x": 1})
 
 
 @pytest.mark.parametrize(("code", "values", "where", "sentence"), EXAMPLES)
