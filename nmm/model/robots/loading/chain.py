@@ -94,6 +94,10 @@ class _Plan:
         return self.root * placement if joint == self.count else placement
 
 
+def yaw_of(placement: pin.SE3) -> float:
+    return float(np.arctan2(placement.rotation[1, 0], placement.rotation[0, 0]))
+
+
 def mimic_joints_of(source: pin.Model) -> tuple[MimicJoint, ...]:
     """The joints that a model built with `mimic=True` has follow others."""
     found = []

@@ -2,6 +2,7 @@
 
 `URDF` and `SRDF` are the tables, by path from the root; docs/file_elements.md prints them."""
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -182,26 +183,24 @@ SRDF: Table = {
 }
 
 
-class _Seen(NamedTuple):
-    """A finding without its count, and the element that it was found at first."""
-
-    code: str
-    values: Mapping[str, str]
+#: A finding without its count: its code and values, which tell one kind from another.
+_Seen = tuple[str, tuple[tuple[str, str], ...]]
 
 
 def unread(root: Element, table: Table, minor: int = 0) -> list[Finding]:
     """A note for each kind of what a file of version 1.`minor` holds and nmm does not read or does not know:
     its first line, and how many there are."""
-    lines: dict[str, list[int]] = {}
-    kinds: dict[str, _Seen] = {}
+    lines: dict[_Seen, list[int]] = defaultdict(list)
     for seen, line in _walk(root, root.tag, table, minor):
-        key = repr(seen)
-        kinds[key] = seen
-        lines.setdefault(key, []).append(line)
+        lines[seen].append(line)
     return [
-        Finding(seen.code, {**seen.values, "count": len(lines[key])}, {"line": lines[key][0]})
-        for key, seen in kinds.items()
+        Finding(code, {**dict(values), "count": len(at)}, {"line": at[0]})
+        for (code, values), at in lines.items()
     ]
+
+
+def _seen(code: str, **values: str) -> _Seen:
+    return code, tuple(values.items())
 
 
 def _walk(element: Element, path: str, table: Table, minor: int) -> Iterator[tuple[_Seen, int]]:
@@ -220,11 +219,11 @@ def _walk(element: Element, path: str, table: Table, minor: int) -> Iterator[tup
             continue  # which is told otherwise
         if found is None:
             near = _near(below.tag, _tags(path, table))
-            yield _Seen("element_unknown", {**about, "near": near}), below.line
+            yield _seen("element_unknown", **about, near=near), below.line
         elif below.tag in met or (met and element.tag == "geometry"):
-            yield _Seen("element_again", about), below.line
+            yield _seen("element_again", **about), below.line
         elif found.how == NOTED and not found.told and (found.when is None or found.when(below)):
-            yield _Seen("element_unread", {**about, "why": found.why}), below.line
+            yield _seen("element_unread", **about, why=found.why), below.line
         elif found.how == READ and not found.told:
             yield from _walk(below, path_below, table, minor)
         if found is not None and (found.once or element.tag == "geometry"):
@@ -235,11 +234,11 @@ def _attribute(tag: str, name: str, how: How | None, part: Part, minor: int) -> 
     about = {"element": tag, "attribute": name}
     if how is None:
         known = [one for one, other in part.attributes.items() if other.how == READ]
-        return _Seen("attribute_unknown", {**about, "near": _near(name, known)})
+        return _seen("attribute_unknown", **about, near=_near(name, known))
     if how.since > minor:
         why = f"it counts from version 1.{how.since} on, and the file's is 1.{minor}"
-        return _Seen("attribute_unread", {**about, "why": why})
-    return _Seen("attribute_unread", {**about, "why": how.why}) if how.how == NOTED else None
+        return _seen("attribute_unread", **about, why=why)
+    return _seen("attribute_unread", **about, why=how.why) if how.how == NOTED else None
 
 
 def _tags(path: str, table: Table) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -12,8 +11,10 @@ import pinocchio as pin
 from nmm.base.arrays import Array
 from nmm.base.findings import Finding
 from nmm.model.platforms.wheel_layout import HITCHES, PARALLEL
+from nmm.model.robots.loading.chain import yaw_of
 from nmm.model.robots.loading.extents import has_width
 from nmm.model.robots.loading.measured_joints import ROUNDED, Measured
+from nmm.model.robots.loading.provenance import reference_in_root
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.wheel import Wheel
 from nmm.model.robots.wheel_slip import plain_wheels
@@ -47,7 +48,7 @@ class Ground:
             carrier = measured.placements[robot.model.getJointId(wheel.carrier)]
             lowest[wheel.joint] = float(carrier.act(wheel.center)[2]) - wheel.radius
         is_seen = any(_has_shape(robot, wheel) for wheel in robot.wheels)
-        return cls(_reference(robot), lowest, near, is_seen)
+        return cls(reference_in_root(robot), lowest, near, is_seen)
 
     @property
     def z(self) -> float:
@@ -63,7 +64,7 @@ class Ground:
         x, y, z = self.reference.act(np.array([0.0, 0.0, self.z])) + 0.0
         z = 0.0 if abs(z) <= self.near else z  # as without a reference point of its own
         touching = f"the wheels touch it at z = {z:.4g} m in link {root!r}"
-        yaw = math.atan2(self.reference.rotation[1, 0], self.reference.rotation[0, 0])
+        yaw = yaw_of(self.reference)
         at = f"{x:.6g},{y:.6g},{z:.4g}{f',{yaw:.6g}' if abs(yaw) > PARALLEL else ''}"
         spaced = at.replace(",", ", ")
         return f"{touching}; heights count from the ground with --axle {at} (axle=({spaced}))"
@@ -79,14 +80,6 @@ class Ground:
                 off = float(frame.placement.translation[2]) - self.z
                 if abs(off) > self.near:
                     yield Finding("footprint_off_ground", {"frame": frame.name, "off": off})
-
-
-def _reference(robot: Robot) -> pin.SE3:
-    """Pose of the platform's reference point in the root link (`load`'s `axle`)."""
-    for note in robot.notes:
-        if note.code == "reference_moved":
-            return pin.SE3(pin.utils.rotate("z", note.values["yaw"]), np.array(note.values["at"]))
-    return pin.SE3.Identity()
 
 
 def _has_shape(robot: Robot, wheel: Wheel) -> bool:

@@ -114,8 +114,16 @@ class Measured:
         return lean <= PARALLEL or (lean <= _LEAN and self._is_column(joint))
 
     def _is_column(self, joint: int) -> bool:
-        below = [i for i, parent in enumerate(self.model.parents) if parent == joint]
+        below = self.children(joint)
         return bool(below) and all(self.why_not_rolling(one) is None for one in below)
+
+    def children(self, joint: int) -> list[int]:
+        """The joints right below one."""
+        return [*map(int, self.model.children[joint])]
+
+    def is_endless(self, joint: int) -> bool:
+        """Whether nothing limits it."""
+        return not np.isfinite(ends_of(self.model, joint)).any()
 
     def points_down(self, joint: int) -> bool:
         """Whether it turns about an upright axis that points down: its angle counts to the right."""
@@ -128,9 +136,8 @@ class Measured:
         rolls = self.why_not_rolling(joint) is None
         if is_named(names, _WHEELS) or (rolls and _SHORT_NAMES.search(names)):
             return True
-        endless = not np.isfinite(ends_of(self.model, joint)).any()
         on_base = int(self.model.parents[joint]) == self.root
-        if not (rolls and endless and _CORNERS.search(names)):
+        if not (rolls and self.is_endless(joint) and _CORNERS.search(names)):
             return False
         return on_base or any(tyre.is_round for tyre in self.tyres(joint))
 
@@ -171,7 +178,7 @@ class Measured:
         """Why the joint cannot be a wheel's, wherever it hangs; None when it can."""
         if not is_revolute(self.model.joints[joint]):
             return {"why": "not_turning"}
-        if joint in list(self.model.parents):
+        if self.children(joint):
             return {"why": "joint_below"}
         if abs(self.axis(joint)[2]) > _CAMBER:
             return {"why": "axis_not_level"}
@@ -203,9 +210,9 @@ class Measured:
         if between != [int(model.parents[joint])] or not self.is_upright(swivel):
             names = ", ".join(str(model.names[above]) for above in between)
             return {"why": "joint_between", "between": names}
-        for below, parent in enumerate(model.parents):
+        for below in self.children(swivel):
             other = str(model.names[below])
-            if parent == swivel and (other not in candidates or self.why_not_rolling(below) is not None):
+            if other not in candidates or self.why_not_rolling(below) is not None:
                 return {"why": "swivel_carries_more", "swivel": str(model.names[swivel]), "other": other}
         return None
 

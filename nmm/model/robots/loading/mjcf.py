@@ -11,6 +11,7 @@ import pinocchio as pin
 from nmm.base.arrays import Array
 from nmm.base.findings import Finding
 from nmm.base.findings.robot_file import refusal
+from nmm.model.robots.loading.chain import yaw_of
 from nmm.model.robots.loading.check import RESERVED
 from nmm.model.robots.loading.check_parts import MESH_SUFFIXES, MOMENTS
 from nmm.model.robots.loading.mending import NO_LIMIT
@@ -126,7 +127,7 @@ class _Writer:
         if others:
             self.faults.add(others[0].element, "mjcf_unread", what="a joint beside a free joint")
         place = body.place
-        yaw = float(np.arctan2(place.rotation[1, 0], place.rotation[0, 0]))
+        yaw = yaw_of(place)
         x, y, z = map(float, place.translation)
         self.start |= {"x": x, "y": y, "theta": yaw}
         ground = pin.SE3(pin.utils.rotate("z", yaw), np.array([x, y, 0.0]))

@@ -15,6 +15,7 @@ from nmm.model.robots.loading.mjcf_numbers import Numbers
 from nmm.model.robots.loading.mjcf_reading import Dropped, Mjcf
 from nmm.model.robots.loading.mjcf_tree import Body, Geom, Inertial, Mesh
 from nmm.model.robots.loading.xml_tree import Attributes, Element
+from nmm.model.robots.mesh_files import mesh_arrays
 
 #: A step of a derivative along the imaginary axis, which loses no digits.
 _STEP = 1e-30
@@ -189,12 +190,7 @@ def _volume(kind: str, size: np.ndarray) -> tuple[complex, np.ndarray]:
 @lru_cache(maxsize=64)
 def _triangles(file: Path, _changed: int) -> tuple[Array, np.ndarray]:
     """Corners (n, 3) and faces (m, 3) of a file."""
-    if file.suffix.lower() == ".msh":
-        return _msh(file)
-    import trimesh
-
-    mesh = trimesh.load(file, force="mesh", process=False, skip_materials=True)
-    return np.array(mesh.vertices, dtype=float), np.array(mesh.faces)
+    return _msh(file) if file.suffix.lower() == ".msh" else mesh_arrays(str(file))
 
 
 def _msh(file: Path) -> tuple[Array, np.ndarray]:

@@ -43,12 +43,14 @@ def rename_model(model: pin.Model, names: Names) -> None:
 
 
 def with_names(value: Any, names: Names) -> Any:
-    """A name, or all that are in lists and mappings, with the new for the old; other values as they are."""
+    """A name, or all in lists, tuples and mappings, with the new for the old; other values as they are."""
     if isinstance(value, str):
         return names.get(value, value)
     if isinstance(value, Mapping):
         return {with_names(key, names): with_names(item, names) for key, item in value.items()}
-    return [with_names(item, names) for item in value] if isinstance(value, list | tuple) else value
+    return (
+        type(value)(with_names(item, names) for item in value) if isinstance(value, list | tuple) else value
+    )
 
 
 def renamed_findings(findings: Iterable[Finding], names: Names) -> list[Finding]:

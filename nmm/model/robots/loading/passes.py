@@ -11,7 +11,7 @@ from nmm.base.findings import Finding
 from nmm.model.platforms import AddedJoint, FixedBase
 from nmm.model.platforms.recognition import AT_ROOT
 from nmm.model.platforms.wheel_layout import MAIN_BODY, standing_wheels, wheels_on
-from nmm.model.robots.loading.chain import CHAIN, joint_notes
+from nmm.model.robots.loading.chain import CHAIN, joint_notes, yaw_of
 from nmm.model.robots.loading.check import RESERVED
 from nmm.model.robots.loading.draft import Draft, Options
 from nmm.model.robots.loading.ground import slip_warnings
@@ -19,7 +19,7 @@ from nmm.model.robots.loading.locking import add_pairs, among_coordinates, at_ze
 from nmm.model.robots.loading.measured_joints import speed_limit
 from nmm.model.robots.loading.names_apart import frames_among, joints_among, renamed_findings, with_names
 from nmm.model.robots.loading.passive_wheels import find_wheels, held_joints, without_radius
-from nmm.model.robots.loading.platform_choice import axle_placement, choose_platform, yaw_of
+from nmm.model.robots.loading.platform_choice import axle_placement, choose_platform
 from nmm.model.robots.loading.provenance import Parts, acceleration_notes
 from nmm.model.robots.loading.source import Source
 from nmm.model.robots.loading.virtual_base import find_virtual_base, gantry

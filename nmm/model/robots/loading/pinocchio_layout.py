@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from nmm.base.arrays import Array, array
 from nmm.base.errors import InputError, expect_known, few, no_such
 from nmm.model.robots.joint_table import twist
-from nmm.model.robots.loading.chain import CHAIN, CHAIN_JOINTS, Head, rebuild, replaced_joints
+from nmm.model.robots.loading.chain import CHAIN, CHAIN_JOINTS, Head, rebuild, replaced_joints, yaw_of
 from nmm.model.robots.loading.joint_kinds import is_continuous, is_mimic, is_simple, kind
 from nmm.model.robots.loading.provenance import with_wheels_fixed
 from nmm.model.robots.loading.root_layout import ROOTS, ChainRoot
@@ -252,8 +252,7 @@ class PinocchioLayout:
             raise InputError("the model's root joint stands elsewhere in the world", where=robot.name)
         if offset.rotation[2, 2] < 1.0 - 1e-9:
             raise InputError("the model's root is tilted against the platform's", where=robot.name)
-        yaw = np.arctan2(offset.rotation[1, 0], offset.rotation[0, 0])
-        return ROOTS[name](np.array([*offset.translation, yaw]))
+        return ROOTS[name](np.array([*offset.translation, yaw_of(offset)]))
 
     def _matched(self) -> tuple[list[tuple[int, int, float]], dict[int, float]]:
         """Joints of the model with the columns of q and their signs, and those that stand at a value."""

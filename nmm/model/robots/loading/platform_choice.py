@@ -9,7 +9,7 @@ from nmm.base.errors import InputError, RobotError, expect_known
 from nmm.base.findings import Finding
 from nmm.model.platforms import FixedBase, Layout, Platform, platform_by_name
 from nmm.model.platforms.recognition import AT_ROOT, Pose, recognized, reference_of
-from nmm.model.robots.loading.chain import CHAIN
+from nmm.model.robots.loading.chain import CHAIN, yaw_of
 from nmm.model.robots.loading.draft import Draft
 from nmm.model.robots.loading.measured_joints import Measured
 from nmm.model.robots.loading.measured_layout import measure_layout
@@ -92,7 +92,3 @@ def _level_frame(model: pin.Model, name: str, where: str) -> pin.SE3:
     if placement.rotation[2, 2] < 1.0 - 0.5 * _LEVEL**2:
         raise RobotError(f"frame {name!r} is tilted, expected its z axis upwards", where=where, got=name)
     return pin.SE3(pin.utils.rotate("z", yaw_of(placement)), np.array(placement.translation))
-
-
-def yaw_of(placement: pin.SE3) -> float:
-    return float(np.arctan2(placement.rotation[1, 0], placement.rotation[0, 0]))

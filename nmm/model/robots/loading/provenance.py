@@ -94,6 +94,14 @@ def provenance_of(robot: Robot) -> Provenance:
     return robot.parts.provenance if isinstance(robot.parts, Parts) else Provenance()
 
 
+def reference_in_root(robot: Robot) -> pin.SE3:
+    """Pose of the platform's reference point in the root link (`load`'s `axle`)."""
+    for note in robot.notes:
+        if note.code == "reference_moved":
+            return pin.SE3(pin.utils.rotate("z", note.values["yaw"]), np.array(note.values["at"]))
+    return pin.SE3.Identity()
+
+
 def accelerations_of(robot: Robot) -> dict[str, float]:
     """By input, how fast it may change by the robot's files, m/s^2 or rad/s^2, what follows it included."""
     inputs = {

@@ -10,7 +10,9 @@ import pinocchio as pin
 
 from nmm.base.errors import RobotError, expect_known
 from nmm.base.findings import Finding
-from nmm.model.robots.loading.provenance import provenance_of
+from nmm.model.robots.loading.chain import yaw_of
+from nmm.model.robots.loading.names_apart import with_names
+from nmm.model.robots.loading.provenance import provenance_of, reference_in_root
 from nmm.model.robots.loading.srdf import read_srdf, srdf_beside
 from nmm.model.robots.loading.srdf_parts import Group, Srdf
 from nmm.model.robots.robot import Robot
@@ -76,17 +78,12 @@ def with_states(robot: Robot, states: Srdf | None, start: Mapping[str, float]) -
 
 def _at_reference(values: Mapping[str, float], robot: Robot) -> dict[str, float]:
     """Coordinates by name, x, y and theta of the root link given: there of the reference point."""
-    moved = next((note.values for note in robot.notes if note.code == "reference_moved"), None)
-    if moved is None or "theta" not in values:
+    if "theta" not in values:
         return {**values}
-    x, y = moved["at"][:2]
-    cosine, sine = float(np.cos(values["theta"])), float(np.sin(values["theta"]))
-    place = {
-        "x": values["x"] + cosine * x - sine * y,
-        "y": values["y"] + sine * x + cosine * y,
-        "theta": values["theta"] + moved["yaw"],
-    }
-    return {**values, **place}
+    reference = reference_in_root(robot)
+    root = pin.SE3(pin.utils.rotate("z", values["theta"]), np.array([values["x"], values["y"], 0.0]))
+    x, y, _ = (root * reference).translation.tolist()
+    return {**values, "x": x, "y": y, "theta": values["theta"] + yaw_of(reference)}
 
 
 def _without_passive(
@@ -104,28 +101,15 @@ def _without_passive(
 def _in_robots_names(srdf: Srdf, robot: Robot) -> Srdf:
     """The same, with the robot's names of joints and links that are called otherwise in its file."""
     new = robot.renamed
-    if not new:
-        return srdf
-
-    def named(names: tuple[str, ...]) -> tuple[str, ...]:
-        return tuple(new.get(name, name) for name in names)
-
-    states = {
-        name: {new.get(joint, joint): values for joint, values in state.items()}
-        for name, state in srdf.states.items()
-    }
+    states = {name: with_names(state, new) for name, state in srdf.states.items()}
+    named = ("joints", "links", "chains")
     groups = {
-        name: Group(named(one.joints), named(one.links), one.groups, tuple(map(named, one.chains)))  # type: ignore[arg-type]  # pairs
+        name: one._replace(**{key: with_names(getattr(one, key), new) for key in named})
         for name, one in srdf.groups.items()
     }
-    pairs = {"disabled": srdf.disabled, "enabled": srdf.enabled}
-    return srdf._replace(
-        states=states,
-        groups=groups,
-        untouched=named(srdf.untouched),
-        passive=named(srdf.passive),
-        **{key: tuple(map(named, of_key)) for key, of_key in pairs.items()},  # type: ignore[arg-type]  # pairs
-    )
+    others = ("disabled", "enabled", "untouched", "passive")
+    renamed = {key: with_names(getattr(srdf, key), new) for key in others}
+    return srdf._replace(states=states, groups=groups, **renamed)
 
 
 def disabled_pairs(srdf: Srdf, robot: Robot) -> tuple[tuple[str, str], ...]:

@@ -14,7 +14,7 @@ from nmm.model.platforms.wheel_layout import NEAR
 from nmm.model.robots.coordinates import UNLIMITED
 from nmm.model.robots.joint_table import twist
 from nmm.model.robots.loading.joint_kinds import kind
-from nmm.model.robots.loading.measured_joints import Measured, speed_limit
+from nmm.model.robots.loading.measured_joints import Measured, ends_of, speed_limit
 
 #: How far the two ways in which a base slides may be from level, rad.
 _LEVEL = 1e-3
@@ -69,7 +69,7 @@ def find_virtual_base(model: pin.Model, where: str) -> VirtualBase | None:
             return None
         place = _place(measured, found)
     names = tuple(str(model.names[i]) for i in found)
-    ends = {str(model.names[i]): _ends(model, i) for i in found if not _is_endless(model, i)}
+    ends = {str(model.names[i]): ends_of(model, i) for i in found if not _is_endless(model, i)}
     return VirtualBase(names, drives, tuple(speed_limit(model, i) for i in found), ends, place)
 
 
@@ -122,23 +122,18 @@ def _chain(
     return found, ways
 
 
-def _ends(model: pin.Model, joint: int) -> tuple[float, float]:
-    index = model.joints[joint].idx_q
-    return float(model.lowerPositionLimit[index]), float(model.upperPositionLimit[index])
-
-
 def _is_endless(model: pin.Model, joint: int) -> bool:
-    lower, upper = _ends(model, joint)
+    lower, upper = ends_of(model, joint)
     return min(-lower, upper) >= UNLIMITED
 
 
 def _has_room(model: pin.Model, joint: int) -> bool:
-    lower, upper = _ends(model, joint)
+    lower, upper = ends_of(model, joint)
     return upper - lower >= _ROOM
 
 
 def _moves(model: pin.Model, joint: int) -> bool:
-    lower, upper = _ends(model, joint)
+    lower, upper = ends_of(model, joint)
     return lower < upper
 
 

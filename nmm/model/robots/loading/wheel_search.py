@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from nmm.model.platforms.wheel_layout import HITCHES, PARALLEL, Rollers, is_named
-from nmm.model.robots.loading.joint_kinds import is_revolute, joint_limits
-from nmm.model.robots.loading.measured_joints import Asked, Measured, Undercarriage, expect_names
+from nmm.model.robots.loading.joint_kinds import is_revolute
+from nmm.model.robots.loading.measured_joints import Asked, Measured, Undercarriage, ends_of, expect_names
 
 #: Joints at one point are nearer to each other than this, m.
 _TOGETHER = 2e-3
@@ -63,14 +62,6 @@ class _Search:
             tuple(names[joint] for joint in aloft),
         )
 
-    @cached_property
-    def _children(self) -> dict[int, list[int]]:
-        parents = list(self.measured.model.parents)
-        below: dict[int, list[int]] = {joint: [] for joint in range(len(parents))}
-        for joint, parent in enumerate(parents[1:], start=1):
-            below[int(parent)].append(joint)
-        return below
-
     def _is_level(self, joint: int) -> bool:
         model = self.measured.model
         return is_revolute(model.joints[joint]) and abs(self.measured.axis(joint)[2]) <= PARALLEL
@@ -86,13 +77,14 @@ class _Search:
         """By wheel: the joints on its rim, each of which only turns."""
         found: dict[int, list[int]] = {}
         model = self.measured.model
-        for wheel, some in self._children.items():
-            if wheel <= self.measured.root or len(some) < _ROLLERS or not self._is_level(wheel):
+        for wheel in range(self.measured.root + 1, model.njoints):
+            some = self.measured.children(wheel)
+            if len(some) < _ROLLERS or not self._is_level(wheel):
                 continue
             centre, along = self.measured.placements[wheel].translation, self.measured.axis(wheel)
             away = [np.cross(self.measured.placements[one].translation - centre, along) for one in some]
             sizes = np.linalg.norm(away, axis=1)
-            turn = all(is_revolute(model.joints[one]) and not self._children[one] for one in some)
+            turn = all(is_revolute(model.joints[one]) and not self.measured.children(one) for one in some)
             if turn and sizes.min() > _TOGETHER and np.ptp(sizes) < 0.1 * sizes.max():
                 found[wheel] = some
         return found
@@ -106,14 +98,14 @@ class _Search:
         """Joints that roll one about another at one point: a ball, which rolls every way."""
         model, found = self.measured.model, list[int]()
         for joint in range(self.measured.root + 1, model.njoints):
-            if self._children[joint]:
+            if self.measured.children(joint):
                 continue
             ball = [joint]  # from the last joint upwards, while each is the only one at the same point
             while (parent := int(model.parents[ball[-1]])) > self.measured.root:
                 apart = np.linalg.norm(model.jointPlacements[ball[-1]].translation)
                 if (
                     apart > _TOGETHER
-                    or len(self._children[parent]) > 1
+                    or len(self.measured.children(parent)) > 1
                     or not is_revolute(model.joints[parent])
                 ):
                     break
@@ -176,28 +168,27 @@ class _Search:
 
     def _idle(self, wheels: list[int]) -> set[int]:
         """What is called a wheel beside real ones, and turns without end about an upright axis, bare."""
-        model = self.measured.model
         return {
             joint
-            for joint in (self._children[self.measured.root] if wheels else ())
+            for joint in (self.measured.children(self.measured.root) if wheels else ())
             if self._is_meant(joint)
-            and not self._children[joint]
+            and not self.measured.children(joint)
             and self.measured.is_upright(joint)
-            and not any(np.isfinite(end[0]) for end in joint_limits(model, joint)[4:6])
+            and self.measured.is_endless(joint)
         }
 
     def _carries_only(self, joint: int, parts: Collection[int]) -> bool:
-        pending = [*self._children[joint]]
+        pending = [*self.measured.children(joint)]
         while pending:
             below = pending.pop()
             if below not in parts and not self._leads_to(below, parts):
                 return False
-            pending += self._children[below]
+            pending += self.measured.children(below)
         return True
 
     def _leads_to(self, joint: int, parts: Collection[int]) -> bool:
         """Whether some wheel is below."""
-        return any(one in parts or self._leads_to(one, parts) for one in self._children[joint])
+        return any(one in parts or self._leads_to(one, parts) for one in self.measured.children(joint))
 
     def _unnamed(self, direct: list[int]) -> list[int]:
         """Joints on the base whose bodies are round about them and on one ground, with what is named so."""
@@ -205,11 +196,14 @@ class _Search:
             return []
         model, root = self.measured.model, self.measured.root
         found = []
-        columns = [one for one in self._children[root] if self.measured.is_upright(one)]
-        below = [self._children[one][0] for one in columns if len(self._children[one]) == 1]
-        for joint in (*self._children[root], *below):
-            endless = not any(np.isfinite(end[0]) for end in joint_limits(model, joint)[4:6])
-            if joint in direct or not endless or self.measured.why_not_rolling(joint) is not None:
+        columns = [one for one in self.measured.children(root) if self.measured.is_upright(one)]
+        below = [self.measured.children(one)[0] for one in columns if len(self.measured.children(one)) == 1]
+        for joint in (*self.measured.children(root), *below):
+            if (
+                joint in direct
+                or not self.measured.is_endless(joint)
+                or self.measured.why_not_rolling(joint) is not None
+            ):
                 continue
             if str(model.names[joint]) not in self.own and self._is_round(joint):
                 found.append(joint)
@@ -228,6 +222,5 @@ class _Search:
         return any(tyre.is_round for tyre in self.measured.tyres(joint))
 
     def _rest(self, joint: int) -> float:
-        model = self.measured.model
-        lower, upper = (float(end[0]) for end in joint_limits(model, joint)[4:6])
-        return float(min(max(0.0, lower), upper))
+        lower, upper = ends_of(self.measured.model, joint)
+        return min(max(0.0, lower), upper)
