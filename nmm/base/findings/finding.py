@@ -108,8 +108,8 @@ class _Sentence(Formatter):
             case "many":
                 return counted(value, rest) if value else f"no {rest}s"
             case "plural":
-                one, several = rest.split("|")
-                return one if (value if isinstance(value, int) else len(value)) == 1 else several
+                singular, plural = rest.split("|")
+                return singular if (value if isinstance(value, int) else len(value)) == 1 else plural
             case "quoted":
                 return quoted(value)
         return str(super().format_field(value, format_spec))
@@ -127,7 +127,7 @@ _PARTS: Mapping[str, Callable[[Any], bool]] = {
 def _texts(values: Any, form: str) -> list[str]:
     """Each value, or a mapping's name and value, as a form with % has it; a list in it is written in turn."""
     rows = values.items() if isinstance(values, Mapping) else [(value,) for value in values]
-    flat = [[x for one in row for x in (one if isinstance(one, list | tuple) else [one])] for row in rows]
+    flat = [[x for cell in row for x in (cell if isinstance(cell, list | tuple) else [cell])] for row in rows]
     return [(form or "%s") % tuple(row) for row in flat]
 
 

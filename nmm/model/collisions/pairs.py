@@ -45,6 +45,10 @@ def query_shapes(robot: Robot, meshes: str = HULLS) -> pin.GeometryModel:
     return found
 
 
+def pairs_of(shapes: pin.GeometryModel) -> list[Pair]:
+    return [(pair.first, pair.second) for pair in shapes.collisionPairs]
+
+
 def link_names(robot: Robot, shapes: pin.GeometryModel) -> tuple[str, ...]:
     return tuple(robot.model.frames[shape.parentFrame].name for shape in shapes.geometryObjects)
 
@@ -95,7 +99,7 @@ def own_shapes(robot: Robot, meshes: str, distance: float) -> tuple[pin.Geometry
     """`query_shapes`, which are not to be changed, and of the model's pairs those nearer than `distance`, m,
     in every random configuration."""
     shapes = query_shapes(robot, meshes)
-    pairs = [(pair.first, pair.second) for pair in robot.collision_model.collisionPairs]
+    pairs = pairs_of(robot.collision_model)
     return shapes, frozenset(always_near(robot, shapes, pairs, distance))
 
 
@@ -190,7 +194,7 @@ def touching_links(robot: Robot, count: int = CONFIGURATIONS) -> Touching:
     """
     shapes = query_shapes(robot)
     links = link_names(robot, shapes)
-    pairs = [(pair.first, pair.second) for pair in robot.collision_model.collisionPairs]
+    pairs = pairs_of(robot.collision_model)
     if not pairs:
         return Touching(len(links), count, {})
     for pair in pairs:

@@ -17,6 +17,7 @@ from nmm.base.kernels.compiled import checked_by_caller, compiled
 from nmm.base.kernels.record_layout import BLOCKS, Blocks, Memory, views
 from nmm.model.collisions.broad_phase import PairArrays, find_near
 from nmm.model.collisions.obstacle import Obstacle
+from nmm.model.collisions.pairs import pairs_of
 from nmm.model.collisions.rows import Rows, write_row, write_rows
 from nmm.model.robots.joint_table import placement_rows
 from nmm.model.robots.robot import Robot
@@ -205,8 +206,8 @@ def _scene(
         boxes[i] = _box(shape.geometry)
         points, rounding[i] = _corners(shape.geometry)
         corners.append(points)
-    listed = [(pair.first, pair.second) for pair in shapes.collisionPairs]
-    pairs, P = np.array(listed, dtype=np.int64).reshape(-1, 2), len(listed)
+    pairs = np.array(pairs_of(shapes), dtype=np.int64).reshape(-1, 2)
+    P = len(pairs)
     planes = [i for i in range(own, count) if isinstance(objects[i].geometry, coal.Halfspace)]
     return PairArrays(
         band=np.array(band),

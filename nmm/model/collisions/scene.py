@@ -13,7 +13,7 @@ import pinocchio as pin
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError, RobotError, few
 from nmm.model.collisions.obstacle import Obstacle
-from nmm.model.collisions.pairs import always_near, link_names, named_pairs, own_shapes, touching
+from nmm.model.collisions.pairs import always_near, link_names, named_pairs, own_shapes, pairs_of, touching
 from nmm.model.collisions.queries import Queries
 from nmm.model.collisions.shapes import HalfSpace
 from nmm.model.robots.loading.srdf import read_srdf
@@ -104,7 +104,7 @@ def set_up(
     for one in sorted_obstacles:
         shapes.addGeometryObject(pin.GeometryObject(one.name, 0, 0, one.at(0.0), one.shape.geometry()))
         known.append((one.name,))
-    wanted = [(pair.first, pair.second) for pair in robot.collision_model.collisionPairs] if own else []
+    wanted = pairs_of(robot.collision_model) if own else []
     wanted += [(i, j) for j in range(count, count + len(sorted_obstacles)) for i in range(count)]
     notes: list[str] = []
 

@@ -27,6 +27,7 @@ from nmm.model.robots.loading.xml_tree import (
     Element,
     Owner,
     XmlError,
+    body_of,
     child,
     children,
     link_at,
@@ -196,14 +197,9 @@ def _check_tree(links: list[Element], joints: list[Element], reader: Attributes)
 
 def _movable_on_root(joints: list[Element]) -> list[Element]:
     """The movable joints on the root link and on links fixed to it."""
-    ends = [(link_at(joint, "parent"), link_at(joint, "child")) for joint in joints]
-    fixed = [pair for pair, joint in zip(ends, joints, strict=True) if joint.get("type") == "fixed"]
-    grown = {parent for parent, _ in ends} - {below for _, below in ends}
-    body: set[str] = set()
-    while grown != body:
-        body, grown = grown, grown | {below for parent, below in fixed if parent in grown}
-    movable = zip(joints, ends, strict=True)
-    return [joint for joint, (parent, _) in movable if joint.get("type") != "fixed" and parent in body]
+    above = {link_at(joint, "child"): joint for joint in joints}
+    movable = [joint for joint in joints if joint.get("type") != "fixed"]
+    return [joint for joint in movable if body_of(link_at(joint, "parent"), above) not in above]
 
 
 def _end(joint: Element, tag: str, names: Collection[str], reader: Attributes) -> str | None:

@@ -11,7 +11,16 @@ import numpy as np
 
 from nmm.base.findings import Finding
 from nmm.model.robots.loading.check_limits import check_limit
-from nmm.model.robots.loading.xml_tree import NOBODY, Attributes, Element, Owner, child, children, link_at
+from nmm.model.robots.loading.xml_tree import (
+    NOBODY,
+    Attributes,
+    Element,
+    Owner,
+    body_of,
+    child,
+    children,
+    link_at,
+)
 
 #: The file of a mesh by its name, why there is none ("mesh_missing"), or None to leave the shape out.
 FindMesh = Callable[[str], Path | Finding | None]
@@ -222,19 +231,12 @@ def _inertia(inertial: Element) -> tuple[float, np.ndarray]:
 def _on_bodies(links: list[Element], joints: list[Element], found: Attributes) -> None:
     """Bodies that move and have no mass: a body is a link with all that is fixed to it."""
     above = {link_at(joint, "child"): joint for joint in joints}
-
-    def body(name: str) -> str:
-        """The link at the top of the body that a link is part of."""
-        met: set[str] = set()
-        while name in above and above[name].get("type") == "fixed" and name not in met:
-            met.add(name)
-            name = link_at(above[name], "parent")
-        return name
-
     inertials = {link.get("name", ""): child(link, "inertial") for link in links}
-    heavy = {body(name) for name, one in inertials.items() if one is not None and _inertia(one)[0] > 0.0}
+    heavy = {
+        body_of(name, above) for name, one in inertials.items() if one is not None and _inertia(one)[0] > 0.0
+    }
     for link, (name, one) in zip(links, inertials.items(), strict=True):
-        if link.line and name in above and body(name) == name and name not in heavy:
+        if link.line and name in above and body_of(name, above) == name and name not in heavy:
             about = {"moved_by": above[name].get("name"), "inertial": one is not None}
             found.add(link, "body_without_mass", {"link": name}, **about)
 

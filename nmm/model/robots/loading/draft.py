@@ -96,8 +96,8 @@ class Draft:
     @property
     def stated_joints(self) -> tuple[str, ...]:
         """The own joints of a platform that was given with them."""
-        given = self.options.platform
-        return given.coordinates[len(CHAIN) :] if isinstance(given, Platform) else ()
+        platform = self.options.platform
+        return platform.coordinates[len(CHAIN) :] if isinstance(platform, Platform) else ()
 
     def measured(self) -> Measured:
         """The joints and wheels as the model has them now."""
@@ -111,10 +111,12 @@ class Draft:
     def hold(self, values: Mapping[str, float]) -> list[Finding]:
         """Fix joints at values, rad or m, and what follows them; a note on the latter, if there are any.
         `RobotError` for a follower beyond its limits."""
-        following = [one for one in self.mimic_joints if one.joint not in values]  # a fixed one follows none
+        following = [
+            mimic for mimic in self.mimic_joints if mimic.joint not in values
+        ]  # else it follows none
         # A leader that is no joint of the model is a fixed one, which stands at zero.
         movable = {*list(self.model.names)[1:]} - {*CHAIN}
-        absent = {one.leader: 0.0 for one in following if one.leader not in movable}
+        absent = {mimic.leader: 0.0 for mimic in following if mimic.leader not in movable}
         mimicked, self.mimic_joints = settled(following, {**absent, **values})
         for name, (leader, value) in mimicked.items():
             check_limits(self.model, name, value, self.where, f", which follows {leader}")
@@ -134,7 +136,7 @@ class Draft:
         rename_model(self.model, names)
         self.notes = renamed_findings(self.notes, names)
         self.locked, self.mimicked = with_names(self.locked, names), with_names(self.mimicked, names)
-        self.mimic_joints = tuple(one.with_names(names) for one in self.mimic_joints)
+        self.mimic_joints = tuple(mimic.with_names(names) for mimic in self.mimic_joints)
 
     def rename_options(self, names: Mapping[str, str]) -> None:
         """Speak of joints and links by other names in what was asked for."""

@@ -24,15 +24,15 @@ def joints_among(model: pin.Model, taken: Container[str]) -> dict[str, str]:
 
 def _new(model: pin.Model, names: Iterable[str], kind: str) -> dict[str, str]:
     known = {*map(str, model.names), *(frame.name for frame in model.frames)}
-    found: dict[str, str] = {}
+    renamed: dict[str, str] = {}
     for name in dict.fromkeys(names):
         count, new = 1, f"{name}_{kind}"
         while new in known:
             count += 1
             new = f"{name}_{kind}_{count}"
         known.add(new)
-        found[name] = new
-    return found
+        renamed[name] = new
+    return renamed
 
 
 def rename_model(model: pin.Model, names: Names) -> None:
@@ -55,4 +55,4 @@ def with_names(value: Any, names: Names) -> Any:
 
 def renamed_findings(findings: Iterable[Finding], names: Names) -> list[Finding]:
     """The findings with other names in their values."""
-    return [replace(one, values=with_names(one.values, names)) for one in findings]
+    return [replace(finding, values=with_names(finding.values, names)) for finding in findings]

@@ -117,7 +117,7 @@ def _turn_joints_up(draft: Draft) -> None:
     if down:
         draft.rebuild(reversed_joints=down)
         draft.notes.append(Finding("joints_reversed", {"names": down}))
-        draft.mimic_joints = tuple(one.reversed(down) for one in draft.mimic_joints)
+        draft.mimic_joints = tuple(mimic.reversed(down) for mimic in draft.mimic_joints)
 
 
 def _tell_base(draft: Draft) -> None:
@@ -197,9 +197,9 @@ def _hold_idle_parts(draft: Draft) -> None:
         draft.names = {old: new for old, new in draft.names.items() if old not in CHAIN}
         return
     carrying = {wheel.carrier for wheel in draft.layout.wheels}
-    follows = {one.joint for one in draft.mimic_joints}
+    follows = {mimic.joint for mimic in draft.mimic_joints}
     moved = {*draft.platform.coordinates, *carrying, *follows}
-    idle = [one.joint for one in draft.layout.pivots if one.steers and one.joint not in moved]
+    idle = [pivot.joint for pivot in draft.layout.pivots if pivot.steers and pivot.joint not in moved]
     unknown = without_radius(draft.measured(), draft.layout)
     draft.hold(dict.fromkeys((*idle, *unknown), 0.0))
     draft.remarks += [Finding("steering_held", {"names": idle})] if idle else []
@@ -214,8 +214,8 @@ def _free_input_names(draft: Draft) -> None:
     draft.rename_options(like_inputs)
     draft.names |= like_inputs
     base = () if draft.base is None else draft.base.joints
-    told = {old: new for old, new in draft.names.items() if new not in base}
-    draft.remarks += [Finding("names_taken", {"names": told})] if told else []
+    names = {old: new for old, new in draft.names.items() if new not in base}
+    draft.remarks += [Finding("names_taken", {"names": names})] if names else []
 
 
 def _find_wheels(draft: Draft) -> None:
@@ -224,8 +224,8 @@ def _find_wheels(draft: Draft) -> None:
         return
     asked = draft.options.wheels
     if asked is not None:  # those that stand still are joints no more
-        kept = [name for name in asked if draft.model.existJointName(name)]
-        asked = {name: asked[name] for name in kept} if isinstance(asked, Mapping) else kept
+        left = [name for name in asked if draft.model.existJointName(name)]
+        asked = {name: asked[name] for name in left} if isinstance(asked, Mapping) else left
     standing = {wheel.joint for wheel in standing_wheels(draft.layout)}
     sliding = {wheel.joint for wheel in wheels_on(draft.layout, MAIN_BODY)} - standing  # constrain nothing
     own = draft.platform.coordinates[len(CHAIN) :]

@@ -49,19 +49,19 @@ def choose_platform(draft: Draft) -> Pose:
 
 def _recognized_kind(draft: Draft, measured: Measured, layout: Layout) -> str:
     """The kind of platform that the file's wheels or a base of joints tell, or the usual one."""
-    found = recognized(layout)
-    draft.remarks += found.notes
-    if found.is_told:
+    by_wheels = recognized(layout)
+    draft.remarks += by_wheels.notes
+    if by_wheels.is_told:
         draft.origin = "wheels"
     elif draft.base is not None:
         draft.origin = "base"
-        return draft.base.kind or found.kind
+        return draft.base.kind or by_wheels.kind
     else:
         draft.origin = "default"
         fixed, named = measured.fixed_wheels, measured.named_wheels
         none = Finding("no_wheels", {"names": named} if named else {})
         draft.remarks.append(Finding("wheels_fixed", {"names": fixed}) if fixed else none)
-    return found.kind
+    return by_wheels.kind
 
 
 def axle_placement(model: pin.Model, axle: str | ArrayLike, where: str) -> pin.SE3:

@@ -24,7 +24,6 @@ from nmm.model.robots.loading.check import CheckedUrdf, inspect
 from nmm.model.robots.loading.check_parts import mesh_scale, shape_of
 from nmm.model.robots.loading.description import SUFFIXES, describe
 from nmm.model.robots.loading.drive_marks import DriveMarks, drive_marks
-from nmm.model.robots.loading.measured_joints import Undercarriage
 from nmm.model.robots.loading.mjcf import Converted
 from nmm.model.robots.loading.packages import PACKAGE, package_file
 from nmm.model.robots.loading.provenance import Provenance
@@ -49,7 +48,7 @@ class Source:
     on_chain : whether its first joints x, y, theta are a platform's, not the file's
     mimic_joints : each after its leader
     platform : the kind that the file declares; mjcf : what a file of MuJoCo's says besides
-    marks : what the file's text says of its drive; undercarriage: what its wheels hang on, once found"""
+    marks : what the file's text says of its drive"""
 
     name: str
     where: str
@@ -65,7 +64,6 @@ class Source:
     notes: tuple[Finding, ...] = ()
     provenance: Provenance = field(default_factory=Provenance)
     marks: DriveMarks = field(default_factory=DriveMarks)
-    undercarriage: Undercarriage = field(default_factory=Undercarriage)
     mjcf: Converted | None = None
 
 

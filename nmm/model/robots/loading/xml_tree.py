@@ -118,6 +118,16 @@ def link_at(joint: Element, tag: str) -> str:
     return "" if element is None else element.get("link", "")
 
 
+def body_of(link: str, above: Mapping[str, Element]) -> str:
+    """The link at the top of the body that a link is part of, with what is fixed to it; `above` are joints by
+    the link below each."""
+    met: set[str] = set()
+    while link in above and above[link].get("type") == "fixed" and link not in met:
+        met.add(link)
+        link = link_at(above[link], "parent")
+    return link
+
+
 #: The link or joint that an element is part of, as findings have it in `where`.
 Owner = Mapping[str, Any]
 
