@@ -31,10 +31,6 @@ def _outside(name: str, value: float, unit: str, lower: Any, upper: Any, t: floa
     )
 
 
-def _stopped(why: str, lasted: float, t: float, **_: Any) -> str:
-    return f"at rest at t = {t:.4g} s, {lasted:.3g} s after it began to stop ({why})"
-
-
 WORDS: dict[str, Words] = {
     "measurement_refused": _refused,
     "measurements_ended": "no measurement that can be used for {silent:.3g} s at t = {t:.4g} s: stops",
@@ -42,15 +38,11 @@ WORDS: dict[str, Words] = {
     "{t:.4g} s on",
     "off_task": "the task error is {m:.3g} m and {rad:.3g} rad at t = {t:.4g} s, more than allowed: stops",
     "outside_limits": _outside,
-    "call_late": lambda samples, gap, t, end: (
-        f"{counted(samples, 'call')} late, from t = {t:.4g} to {end:.4g} s; "
-        f"at most {gap:.3g} s after the one before"
-    ),
+    "call_late": "{samples:count call} late, from t = {t:.4g} to {end:.4g} s; at most {gap:.3g} s after the "
+    "one before",
     "clock_jumped": "the clock jumped by {by:.4g} s at t = {t:.4g} s",
     "not_called": "not called for {gap:.3g} s before t = {t:.4g} s, or the clock jumped: stops",
-    "resolver_silent": lambda why, samples, t, end: (
-        f"no inputs in {counted(samples, 'call')} from t = {t:.4g} to {end:.4g} s ({why})"
-    ),
+    "resolver_silent": "no inputs in {samples:count call} from t = {t:.4g} to {end:.4g} s ({why})",
     "stop_asked": "asked to stop at t = {t:.4g} s ({why})",
-    "stopped": _stopped,
+    "stopped": "at rest at t = {t:.4g} s, {lasted:.3g} s after it began to stop ({why})",
 }
