@@ -16,7 +16,14 @@ from nmm.model.robots.loading.draft import Options
 from nmm.model.robots.loading.packages import PACKAGE, package_file
 from nmm.model.robots.loading.passes import robot_from
 from nmm.model.robots.loading.source import Source, read_file, read_model, source_path
-from nmm.model.robots.loading.srdf_fitting import with_srdf, with_states
+from nmm.model.robots.loading.srdf import read_srdf, srdf_beside
+from nmm.model.robots.loading.srdf_fitting import (
+    passive_joints,
+    semantics_of,
+    unused,
+    with_semantics,
+    with_states,
+)
 from nmm.model.robots.robot import Robot
 
 
@@ -133,8 +140,25 @@ def _with_srdf(
     file: Path | None,
     folders: Sequence[str | Path],
 ) -> Robot:
-    def held(values: Mapping[str, float]) -> Robot:
-        robot = robot_from(source, replace(options, lock={**values, **options.lock}))
-        return robot if source.mjcf is None else with_states(robot, source.mjcf.states, source.mjcf.start)
+    """The robot with that SRDF (`RobotError` if it is none or has joints that the robot's file lacks), or
+    with what fits of the one beside its file, and a note on what does not."""
+    robot = _made(source, options)
+    path = srdf_beside(file, source.name) if srdf is None and file is not None else srdf
+    if path is None:
+        return robot
+    try:
+        read = read_srdf(path, robot.arguments, folders)
+        passive = passive_joints(read, robot)
+        if passive:
+            robot = _made(source, replace(options, lock={**passive, **options.lock}))
+        semantics = semantics_of(read, robot, passive, strict=srdf is not None)
+    except RobotError as error:
+        if srdf is not None:
+            raise
+        semantics = unused(path, error)  # reading alone is strict
+    return with_semantics(robot, semantics)
 
-    return with_srdf(held({}), srdf, file, source.name, held, folders)
+
+def _made(source: Source, options: Options) -> Robot:
+    robot = robot_from(source, options)
+    return robot if source.mjcf is None else with_states(robot, source.mjcf.states, source.mjcf.start)

@@ -1,6 +1,6 @@
 """What a robot takes of an SRDF: postures, groups of inputs, joints without a motor, links that may touch."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -13,7 +13,6 @@ from nmm.base.findings import Finding
 from nmm.model.robots.loading.chain import yaw_of
 from nmm.model.robots.loading.names_apart import with_names
 from nmm.model.robots.loading.provenance import provenance_of, reference_in_root
-from nmm.model.robots.loading.srdf import read_srdf, srdf_beside
 from nmm.model.robots.loading.srdf_parts import Group, Srdf
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.semantics import NamedPostures, Semantics
@@ -25,40 +24,40 @@ _SLACK = 1e-4
 _JOINTS = (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)
 
 
-def with_srdf(
-    robot: Robot,
-    given: str | Path | None,
-    file: Path | None,
-    name: str,
-    held: Callable[[Mapping[str, float]], Robot],
-    package_dirs: Sequence[str | Path] = (),
-) -> Robot:
-    """The robot with the SRDF given (`RobotError` if it is none or has joints that the robot's file lacks),
-    or else with what fits of the one beside its file, and a note on what does not. `held` makes the robot
-    with joints fixed at values, m and rad: those without a motor."""
-    path = given if given is not None else None if file is None else srdf_beside(file, name)
-    if path is None:
-        return robot
-    try:
-        srdf = read_srdf(path, robot.arguments, package_dirs)
-        robot, passive = _without_passive(robot, srdf, held)
-        semantics = _fitted(_in_robots_names(srdf, robot), robot, strict=given is not None)
-        semantics = replace(semantics, notes=(*srdf.notes, *passive, *semantics.notes))
-    except RobotError as error:
-        if given is not None:
-            raise
-        found = error.findings or (Finding("refused", {"text": str(error)}),)
-        reason = found[0].as_json()  # reading alone is strict
-        semantics = Semantics(notes=(Finding("srdf_unused", {"reason": reason}, {"srdf": Path(path).name}),))
-    notes = (*robot.notes, *semantics.notes)
+def semantics_of(srdf: Srdf, robot: Robot, passive: Mapping[str, float], *, strict: bool) -> Semantics:
+    """What fits of an SRDF, and notes on what does not and on `passive` joints, which stand still; `strict`:
+    `RobotError` for joints that the robot's file lacks."""
+    semantics = _fitted(_in_robots_names(srdf, robot), robot, strict=strict)
+    held = [Finding("passive_held", {"values": dict(passive)}, {"srdf": srdf.path.name})] if passive else []
+    return replace(semantics, notes=(*srdf.notes, *held, *semantics.notes))
+
+
+def unused(path: str | Path, error: RobotError) -> Semantics:
+    """A note that the SRDF beside a robot's file cannot be used, and why."""
+    reasons = error.findings or (Finding("refused", {"text": str(error)}),)
+    return Semantics(
+        notes=(Finding("srdf_unused", {"reason": reasons[0].as_json()}, {"srdf": Path(path).name}),)
+    )
+
+
+def with_semantics(robot: Robot, semantics: Semantics) -> Robot:
+    """The robot with what its SRDF says, besides what its own file says."""
     own = robot.semantics
-    semantics = replace(
+    both = replace(
         semantics,
         postures=NamedPostures({**own.postures, **semantics.postures}),
         disabled=own.disabled + semantics.disabled,
         start=own.start,
     )
-    return replace(robot, **robot.shapes._asdict(), semantics=semantics, notes=notes)
+    notes = (*robot.notes, *semantics.notes)
+    return replace(robot, **robot.shapes._asdict(), semantics=both, notes=notes)
+
+
+def passive_joints(srdf: Srdf, robot: Robot) -> dict[str, float]:
+    """Where the joints without a motor stand, m and rad: as near to zero as their limits let them."""
+    names = [robot.renamed.get(name, name) for name in srdf.passive]
+    free = [name for name in robot.u_names[robot.platform.p :] if name in names]
+    return {name: float(robot.rest[robot.coordinate(name)]) for name in free}
 
 
 def with_states(robot: Robot, states: Srdf | None, start: Mapping[str, float]) -> Robot:
@@ -84,18 +83,6 @@ def _at_reference(values: Mapping[str, float], robot: Robot) -> dict[str, float]
     root = pin.SE3(pin.utils.rotate("z", values["theta"]), np.array([values["x"], values["y"], 0.0]))
     x, y, _ = (root * reference).translation.tolist()
     return {**values, "x": x, "y": y, "theta": values["theta"] + yaw_of(reference)}
-
-
-def _without_passive(
-    robot: Robot, srdf: Srdf, held: Callable[[Mapping[str, float]], Robot]
-) -> tuple[Robot, list[Finding]]:
-    """The robot whose joints without a motor stand where they are nearest to zero, and what to tell."""
-    names = [robot.renamed.get(name, name) for name in srdf.passive]
-    free = [name for name in robot.u_names[robot.platform.p :] if name in names]
-    if not free:
-        return robot, []
-    values = {name: float(robot.rest[robot.coordinate(name)]) for name in free}
-    return held(values), [Finding("passive_held", {"values": values}, {"srdf": srdf.path.name})]
 
 
 def _in_robots_names(srdf: Srdf, robot: Robot) -> Srdf:
