@@ -66,21 +66,21 @@ class Budget:
             self.step()
             yield item
 
-    def called(self, function: Any, *given: Any, **named: Any) -> Any:
-        if function in _GROWING and max(map(abs, given), default=0) > 1_000:
+    def called(self, function: Any, *arguments: Any, **named: Any) -> Any:
+        if function in _GROWING and max(map(abs, arguments), default=0) > 1_000:
             raise BeyondBound("bits in an integer", MOST_BITS)
-        return self.took(function(*given, **named))
+        return self.took(function(*arguments, **named))
 
     def power(self, base: Any, exponent: Any) -> Any:
         if isinstance(base, int) and isinstance(exponent, int) and base.bit_length() * exponent > MOST_BITS:
             raise BeyondBound("bits in an integer", MOST_BITS)
         return base**exponent
 
-    def times(self, one: Any, other: Any) -> Any:
-        for value, count in ((one, other), (other, one)):
+    def times(self, left: Any, right: Any) -> Any:
+        for value, count in ((left, right), (right, left)):
             if isinstance(value, str | list | tuple) and isinstance(count, int):
                 self.took(range(max(0, len(value) * min(count, LONGEST + 1))))
-        return self.took(one * other)
+        return self.took(left * right)
 
     def shift(self, value: Any, count: Any) -> Any:
         if isinstance(count, int) and count > MOST_BITS:
@@ -111,8 +111,8 @@ class _Counted(ast.NodeTransformer):
         return node
 
 
-def _call(name: str, *given: ast.expr) -> ast.Call:
-    return ast.Call(ast.Name(_NAMES[name], ast.Load()), [*given], [])
+def _call(name: str, *arguments: ast.expr) -> ast.Call:
+    return ast.Call(ast.Name(_NAMES[name], ast.Load()), [*arguments], [])
 
 
 @lru_cache(maxsize=10_000)
@@ -124,8 +124,8 @@ def _compiled(text: str, filename: str, mode: str) -> Any:
 
 
 def counted_xacro(xacro: Any, budget: Budget) -> list[tuple[Any, str, Any]]:
-    """What a budget puts in the place of xacro's functions, and of Python's own, which xacro's modules find
-    after their own names: owner, name and value."""
+    """The replacements, with a budget, of xacro's functions, and of Python's own, which xacro's modules look
+    up after their own names: owner, name and value."""
     methods = {name: getattr(budget, method) for method, name in _NAMES.items()}
 
     evaluate_all, evaluate, evaluate_text = xacro.eval_all, xacro.safe_eval, xacro.eval_text
@@ -135,16 +135,16 @@ def counted_xacro(xacro: Any, budget: Budget) -> list[tuple[Any, str, Any]]:
         budget.step()
         evaluate_all(node, macros, symbols)
 
-    def text(given: Any, symbols: Any) -> Any:
-        if len(given) * given.count("$") > LONGEST:  # xacro copies what is left at each
+    def text(content: Any, symbols: Any) -> Any:
+        if len(content) * content.count("$") > LONGEST:  # xacro copies what is left at each
             raise BeyondBound("characters and expressions in a text", LONGEST)
-        return budget.took(evaluate_text(given, symbols))
+        return budget.took(evaluate_text(content, symbols))
 
-    def parameters(given: str) -> Any:
+    def parameters(params: str) -> Any:
         budget.step()
-        if re.search("['\"]", _QUOTED.sub("", given)):  # xacro's pattern would try for ever
+        if re.search("['\"]", _QUOTED.sub("", params)):  # xacro's pattern would try for ever
             raise xacro.XacroException("a quote without end in a macro's params")
-        return parse_parameters(given)
+        return parse_parameters(params)
 
     def cloned(node: Any, deep: bool, document: Any) -> Any:
         budget.step()
@@ -156,7 +156,7 @@ def counted_xacro(xacro: Any, budget: Budget) -> list[tuple[Any, str, Any]]:
         (minidom, "_clone_node", cloned),
         (xacro, "eval_all", elements),
         (xacro, "eval_text", text),
-        (xacro, "safe_eval", lambda given, *names: budget.took(evaluate(given, *names))),
+        (xacro, "safe_eval", lambda expression, *names: budget.took(evaluate(expression, *names))),
         (xacro, "parse_macro_arg", parameters),
         (xacro, "_global_symbols", {**xacro._global_symbols, **methods}),
         (xacro, "compile", _compiled),

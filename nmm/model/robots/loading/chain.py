@@ -100,12 +100,12 @@ def yaw_of(placement: pin.SE3) -> float:
 
 def mimic_joints_of(source: pin.Model) -> tuple[MimicJoint, ...]:
     """The joints that a model built with `mimic=True` has follow others."""
-    found = []
+    mimic_joints = []
     for joint, leader in zip(source.mimicking_joints, source.mimicked_joints, strict=True):
-        one = source.joints[joint].extract()
+        mimic = source.joints[joint].extract()
         names = str(source.names[joint]), str(source.names[leader])
-        found.append(MimicJoint(*names, float(one.scaling), float(one.offset)))
-    return tuple(found)
+        mimic_joints.append(MimicJoint(*names, float(mimic.scaling), float(mimic.offset)))
+    return tuple(mimic_joints)
 
 
 def replaced_joints(source: pin.Model) -> int:
@@ -113,7 +113,7 @@ def replaced_joints(source: pin.Model) -> int:
     kinds = [kind(joint) for joint in source.joints]
     if (
         tuple(source.names)[1:4] == CHAIN
-        and all(found in allowed for found, allowed in zip(kinds[1:4], _CHAIN_KINDS, strict=True))
+        and all(joint_kind in allowed for joint_kind, allowed in zip(kinds[1:4], _CHAIN_KINDS, strict=True))
         and list(source.parents)[1:4] == [0, 1, 2]
         and all(source.jointPlacements[joint].isIdentity(0.0) for joint in (2, 3))
     ):
@@ -205,14 +205,14 @@ def _add_frames(model: pin.Model, plan: _Plan, joints: Mapping[int, int]) -> dic
         if of_chain or (frame.name in names and frame.type == pin.FrameType.FIXED_JOINT):
             frames[index] = top  # the chain's own frames go with the chain, a former root's give way
             continue
-        kept = of_head and plan.keeps_chain
-        of_root = of_head and not kept
+        stays = of_head and plan.keeps_chain
+        of_root = of_head and not stays
         frames[index] = model.addFrame(
             pin.Frame(
                 frame.name,
                 joints[frame.parentJoint],
                 top if of_root else frames[frame.parentFrame],
-                frame.placement if kept else plan.moved(frame.parentJoint, frame.placement),
+                frame.placement if stays else plan.moved(frame.parentJoint, frame.placement),
                 # The root's joint is gone; its frame stays, as Pinocchio keeps those of locked joints.
                 pin.FrameType.FIXED_JOINT if of_root else frame.type,
                 frame.inertia,
@@ -257,9 +257,9 @@ def _add_references(model: pin.Model, plan: _Plan, joints: Mapping[int, int]) ->
             if not is_mimic(source.joints[joint]):
                 sign = -1.0 if source.names[joint] in plan.reversed_joints else 1.0
                 q[model.joints[joints[joint]].idx_q] = sign * value_at(source.joints[joint], old)
-        for one in mimic_joints_of(source):
-            follower, leader = (model.joints[model.getJointId(name)] for name in (one.joint, one.leader))
-            q[follower.idx_q] = one.value(q[leader.idx_q])
+        for mimic in mimic_joints_of(source):
+            follower, leader = (model.joints[model.getJointId(name)] for name in (mimic.joint, mimic.leader))
+            q[follower.idx_q] = mimic.value(q[leader.idx_q])
         model.referenceConfigurations[entry.key()] = q
 
 

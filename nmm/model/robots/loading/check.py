@@ -80,7 +80,7 @@ def inspect(
 
 
 def _counts(root: Element) -> list[tuple[str, int, int]]:
-    """What there is of all that has a bound: a name, how many, and the bound."""
+    """What has a bound: its name, how many there are, and the bound."""
     joints = children(root, "joint")
     above = {link_at(joint, "child"): link_at(joint, "parent") for joint in joints}
     rows: dict[str, int] = {}
@@ -90,8 +90,8 @@ def _counts(root: Element) -> list[tuple[str, int, int]]:
             rows[link] = 0  # until it is known; in a cycle it stays
             row.append(link)
             link = above[link]
-        for k, one in enumerate(reversed(row), rows.get(link, 0) + 1):
-            rows[one] = k
+        for k, name in enumerate(reversed(row), rows.get(link, 0) + 1):
+            rows[name] = k
     moving = sum(joint.get("type") != "fixed" for joint in joints)
     return [
         ("links", max(len(children(root, "link")), len(joints)), MOST_LINKS),
@@ -141,10 +141,10 @@ def _check_robot(root: Element, reader: Attributes, find_mesh: FindMesh, lock: C
 def _minor(root: Element, reader: Attributes) -> int:
     """What is behind the point of the file's version."""
     version = root.get("version", "1.0")
-    found = _VERSION.fullmatch(version)
-    if found is None:
+    match = _VERSION.fullmatch(version)
+    if match is None:
         reader.add(root, "version_unknown", got=version)
-    return 0 if found is None else int(found[1])
+    return 0 if match is None else int(match[1])
 
 
 def _declared_platform(root: Element, reader: Attributes) -> str | None:
@@ -237,16 +237,16 @@ def check_mimics(
     for name, joint in named.items():
         element = child(joint, "mimic")
         moves = joint.get("type") != "fixed" and name not in lock
-        found = _mimic_joint(element, name, reader) if element is not None and moves else None
-        if found is not None and found.leader in named:
-            mimic_joints[name] = found
-        elif found is not None:
-            spared.add(element, "leader_unknown", {"joint": name}, leader=found.leader)
+        mimic = _mimic_joint(element, name, reader) if element is not None and moves else None
+        if mimic is not None and mimic.leader in named:
+            mimic_joints[name] = mimic
+        elif mimic is not None:
+            spared.add(element, "leader_unknown", {"joint": name}, leader=mimic.leader)
     chains = {name: _chain(name, mimic_joints) for name in mimic_joints}
     for name, chain in chains.items():
         if chain[-1] in mimic_joints:
             reader.add(named[name], "mimic_cycle", {"joint": name}, joints=chain)
-    return tuple(sorted(mimic_joints.values(), key=lambda one: len(chains[one.joint])))
+    return tuple(sorted(mimic_joints.values(), key=lambda mimic: len(chains[mimic.joint])))
 
 
 def _mimic_joint(element: Element, name: str, reader: Attributes) -> MimicJoint | None:

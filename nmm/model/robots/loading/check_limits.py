@@ -33,36 +33,36 @@ def check_limit(joint: Element, kind: str, owner: Owner, reader: Attributes, spa
 def accelerations(joints: Iterable[Element]) -> dict[str, float]:
     """By joint, how fast its speed may change, m/s^2 or rad/s^2: the smaller of acceleration and
     deceleration; 0 is no limit, as of velocities."""
-    found = {}
+    bounds = {}
     for joint, limit in _limited(joints):
-        numbers = (Attributes().number(limit, one, minimum=0.0) or inf for one in _RATES[:2])
+        numbers = (Attributes().number(limit, rate, minimum=0.0) or inf for rate in _RATES[:2])
         if (least := min(numbers)) < inf:
-            found[joint.get("name", "")] = least
-    return found
+            bounds[joint.get("name", "")] = least
+    return bounds
 
 
 def soft_limits(joints: Iterable[Element]) -> list[Finding]:
     """A note on the limits of <safety_controller> that are narrower than those of <limit>."""
-    found: dict[str, list[float]] = {}
+    ranges: dict[str, list[float]] = {}
     lines = []
     for joint, limit in _limited(joints):
         safety, is_turning = child(joint, "safety_controller"), joint.get("type") == "continuous"
         ends = _ends(safety, "soft_lower_limit", "soft_upper_limit")
         hard = (-inf, inf) if is_turning else _ends(limit, "lower", "upper") or (-inf, inf)
         if safety is not None and ends is not None and (hard[0] < ends[0] or ends[1] < hard[1]):
-            found[joint.get("name", "")] = [*ends]
+            ranges[joint.get("name", "")] = [*ends]
             lines.append(safety.line)
-    return [_note("soft_limits", lines, limits=found)] if found else []
+    return [_note("soft_limits", lines, limits=ranges)] if ranges else []
 
 
 def limits_of_continuous(joints: Iterable[Element]) -> list[Finding]:
     """A note on joints that have limits of position and turn without end."""
-    found = {}
+    lines = {}
     for joint, limit in _limited(joints):
         ends = _ends(limit, "lower", "upper")
         if joint.get("type") == "continuous" and ends is not None and max(map(abs, ends)) < UNLIMITED:
-            found[joint.get("name", "")] = limit.line
-    return [_note("limits_of_continuous", [*found.values()], names=[*found])] if found else []
+            lines[joint.get("name", "")] = limit.line
+    return [_note("limits_of_continuous", [*lines.values()], names=[*lines])] if lines else []
 
 
 def _limited(joints: Iterable[Element]) -> Iterator[tuple[Element, Element]]:
@@ -77,7 +77,7 @@ def _ends(limit: Element | None, *attributes: str) -> tuple[float, float] | None
     """Both ends; None where they say nothing."""
     if limit is None:
         return None
-    lower, upper = (Attributes().number(limit, one) or 0.0 for one in attributes)
+    lower, upper = (Attributes().number(limit, attribute) or 0.0 for attribute in attributes)
     return (lower, upper) if lower < upper else None
 
 

@@ -131,13 +131,13 @@ def _check_mesh(
     mesh: Element, owner: Owner, reader: Attributes, find_mesh: FindMesh, meshes: dict[str, Path]
 ) -> None:
     name = reader.text(mesh, "filename", owner)
-    found = None if name is None else find_mesh(name)
-    if isinstance(found, Finding):
-        reader.found.append(replace(found, where={**mesh.place, **owner}))
-    elif found is not None and found.suffix.lower() not in MESH_SUFFIXES:
+    answer = None if name is None else find_mesh(name)
+    if isinstance(answer, Finding):
+        reader.found.append(replace(answer, where={**mesh.place, **owner}))
+    elif answer is not None and answer.suffix.lower() not in MESH_SUFFIXES:
         reader.add(mesh, "mesh_format_unknown", owner, mesh=name, available=[*MESH_SUFFIXES])
-    elif name is not None and found is not None:
-        meshes[name] = found
+    elif name is not None and answer is not None:
+        meshes[name] = answer
 
 
 def check_joint(joint: Element, reader: Attributes, spared: Attributes, carries_all: bool = False) -> None:
@@ -188,19 +188,19 @@ def _check_dynamics(joint: Element, owner: Owner, reader: Attributes) -> None:
 def advice(root: Element) -> list[Finding]:
     """What a <robot> without problems leaves open or states oddly."""
     links, joints = children(root, "link"), children(root, "joint")
-    found = Attributes()
-    _on_inertias(links, found)
-    _on_bodies(links, joints, found)
-    _on_joints(joints, found)
-    _on_turns(links, joints, found)
+    reader = Attributes()
+    _on_inertias(links, reader)
+    _on_bodies(links, joints, reader)
+    _on_joints(joints, reader)
+    _on_turns(links, joints, reader)
     named = {link.get("name") for link in links}
     for joint in joints:  # two frames, of which tasks can only speak of the link's
         if joint.get("name") in named:
-            found.add(joint, "name_shared", {"joint": joint.get("name")})
-    return found.found
+            reader.add(joint, "name_shared", {"joint": joint.get("name")})
+    return reader.found
 
 
-def _on_inertias(links: list[Element], found: Attributes) -> None:
+def _on_inertias(links: list[Element], reader: Attributes) -> None:
     for link in links:
         owner = {"link": link.get("name")}
         inertial = child(link, "inertial")
@@ -209,15 +209,15 @@ def _on_inertias(links: list[Element], found: Attributes) -> None:
         mass, moments = _inertia(inertial)
         principal = np.linalg.eigvalsh(moments)
         if mass > HEAVY:
-            found.add(inertial, "mass_large", owner, mass=mass)
+            reader.add(inertial, "mass_large", owner, mass=mass)
         if mass == 0.0 and np.any(moments):
-            found.add(inertial, "mass_missing", owner)
+            reader.add(inertial, "mass_missing", owner)
         if mass > 0.0 and not np.any(moments):
-            found.add(inertial, "inertia_missing", owner, mass=mass)
+            reader.add(inertial, "inertia_missing", owner, mass=mass)
         elif mass > 0.0 and principal[0] <= 0.0:
-            found.add(inertial, "inertia_indefinite", owner, moments=principal.tolist())
+            reader.add(inertial, "inertia_indefinite", owner, moments=principal.tolist())
         elif mass > 0.0 and principal[2] > (1.0 + ROUNDED) * (principal[0] + principal[1]):
-            found.add(inertial, "inertia_impossible", owner, moments=principal.tolist())
+            reader.add(inertial, "inertia_impossible", owner, moments=principal.tolist())
 
 
 def _inertia(inertial: Element) -> tuple[float, np.ndarray]:
@@ -228,38 +228,40 @@ def _inertia(inertial: Element) -> tuple[float, np.ndarray]:
     return 0.0 if mass is None else _number(mass, "value"), moments
 
 
-def _on_bodies(links: list[Element], joints: list[Element], found: Attributes) -> None:
+def _on_bodies(links: list[Element], joints: list[Element], reader: Attributes) -> None:
     """Bodies that move and have no mass: a body is a link with all that is fixed to it."""
     above = {link_at(joint, "child"): joint for joint in joints}
     inertials = {link.get("name", ""): child(link, "inertial") for link in links}
     heavy = {
-        body_of(name, above) for name, one in inertials.items() if one is not None and _inertia(one)[0] > 0.0
+        body_of(name, above)
+        for name, inertial in inertials.items()
+        if inertial is not None and _inertia(inertial)[0] > 0.0
     }
-    for link, (name, one) in zip(links, inertials.items(), strict=True):
+    for link, (name, inertial) in zip(links, inertials.items(), strict=True):
         if link.line and name in above and body_of(name, above) == name and name not in heavy:
-            about = {"moved_by": above[name].get("name"), "inertial": one is not None}
-            found.add(link, "body_without_mass", {"link": name}, **about)
+            about = {"moved_by": above[name].get("name"), "inertial": inertial is not None}
+            reader.add(link, "body_without_mass", {"link": name}, **about)
 
 
-def _on_joints(joints: list[Element], found: Attributes) -> None:
+def _on_joints(joints: list[Element], reader: Attributes) -> None:
     for joint in joints:
         kind, owner = joint.get("type", ""), {"joint": joint.get("name")}
         if kind == "fixed":
             continue
         limit = child(joint, "limit")
         if limit is None:
-            found.add(joint, "velocity_unlimited", owner)
+            reader.add(joint, "velocity_unlimited", owner)
             continue
         if limit.get("velocity") is not None and _number(limit, "velocity") == 0.0:
-            found.add(limit, "velocity_zero", owner)
+            reader.add(limit, "velocity_zero", owner)
         lower, upper = _number(limit, "lower"), _number(limit, "upper")
         if kind != "continuous" and lower == upper:
-            found.add(limit, "joint_held", owner, value=lower)
+            reader.add(limit, "joint_held", owner, value=lower)
         if kind == "revolute" and IN_DEGREES[0] < max(abs(lower), abs(upper)) < IN_DEGREES[1]:
-            found.add(limit, "limits_large", owner, lower=lower, upper=upper)
+            reader.add(limit, "limits_large", owner, lower=lower, upper=upper)
 
 
-def _on_turns(links: list[Element], joints: list[Element], found: Attributes) -> None:
+def _on_turns(links: list[Element], joints: list[Element], reader: Attributes) -> None:
     """Places turned by more than a full turn."""
     parts = [(joint, {"joint": joint.get("name")}) for joint in joints]
     for link in links:
@@ -269,7 +271,7 @@ def _on_turns(links: list[Element], joints: list[Element], found: Attributes) ->
         origin = child(part, "origin")
         rpy = None if origin is None else Attributes().vector(origin, "rpy", 3, owner)
         if origin is not None and rpy is not None and max(map(abs, rpy)) > FULL_TURN:
-            found.add(origin, "rpy_large", owner, rpy=[*rpy])
+            reader.add(origin, "rpy_large", owner, rpy=[*rpy])
 
 
 def _number(element: Element, attribute: str) -> float:

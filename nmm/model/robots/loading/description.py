@@ -54,9 +54,9 @@ class Description:
         """The URDF's text, or its <robot>, whose elements have the lines of the MJCF file."""
         return self.xml if self.mjcf is None else self.mjcf.urdf
 
-    def placed(self, found: Iterable[Finding]) -> list[Finding]:
+    def placed(self, findings: Iterable[Finding]) -> list[Finding]:
         """Findings in its text, without their lines where these are not the file's."""
-        return [replace(one, where={}) if self.expanded else one for one in found]
+        return [replace(finding, where={}) if self.expanded else finding for finding in findings]
 
 
 def describe(
@@ -113,24 +113,26 @@ def _call_of_macro(file: Path, texts: Mapping[str, str]) -> ElementTree.Element 
     import xacro
 
     try:
-        macros = [one for one in parse(read_text(file)).iter("xacro:macro") if one.get("name")]
+        macros = [macro for macro in parse(read_text(file)).iter("xacro:macro") if macro.get("name")]
     except XmlError:
         return None
-    parameters = {one.get("name", "").removeprefix("xacro:"): one.get("params", "").strip() for one in macros}
+    parameters = {
+        macro.get("name", "").removeprefix("xacro:"): macro.get("params", "").strip() for macro in macros
+    }
     if len(parameters) > 1:
         raise refusal(file, Finding("only_macros", {"name": file.name, "macros": parameters}))
     for macro, rest in parameters.items():
-        given, missing = {}, []
+        attributes, missing = {}, []
         while rest:
             name, default, rest = xacro.parse_macro_arg(rest)
             if name in texts:
-                given[name] = texts[name]
+                attributes[name] = texts[name]
             elif default is None:
                 missing.append(name)
         if missing:
             values = {"macro": macro, "missing": missing, "name": file.name}
             raise refusal(file, Finding("macro_parameters_missing", values))
-        return ElementTree.Element(f"xacro:{macro}", given)
+        return ElementTree.Element(f"xacro:{macro}", attributes)
     return None
 
 
@@ -175,11 +177,11 @@ def expand(
     import xacro  # 10 ms, and a URDF needs none of it
     import xacro.substitution_args
 
-    given, budget = _Arguments(arguments), Budget()
+    table, budget = _Arguments(arguments), Budget()
     printed = io.StringIO()
     with _LOCK, _patched(xacro, packages, budget, call), redirect_stderr(printed):
         try:
-            xml = budget.took(xacro.process_file(str(path), mappings=given).toxml())
+            xml = budget.took(xacro.process_file(str(path), mappings=table).toxml())
         # Expressions in the file may raise anything, and so may xacro on what they return.
         except Exception as error:
             raise _explained(error, path, xacro) from None
@@ -187,14 +189,14 @@ def expand(
             xacro.substitution_args_context["arg"] = {}
             xacro.init_stacks(None)
     warnings = [line for line in printed.getvalue().splitlines() if line.startswith("warning: ")]
-    return str(xml), {name: given[name] for name in given.declared}, tuple(dict.fromkeys(warnings))
+    return str(xml), {name: table[name] for name in table.declared}, tuple(dict.fromkeys(warnings))
 
 
 class _Arguments(dict[str, str]):
     """xacro's table of arguments, which remembers those that the file asks for while xacro expands it."""
 
-    def __init__(self, given: Mapping[str, str]) -> None:
-        super().__init__(given)
+    def __init__(self, arguments: Mapping[str, str]) -> None:
+        super().__init__(arguments)
         self.declared: dict[str, None] = {}
 
     def __contains__(self, name: object) -> bool:
@@ -256,9 +258,9 @@ def _reader(xacro: Any, main: Path, budget: Budget, call: ElementTree.Element | 
                 f"included file {filename} does not exist", exc=_Missing(error)
             ) from None
         except RobotError as error:
-            found = error.findings
+            findings = error.findings
         except XmlError as error:
-            found = (error.finding,)
+            findings = (error.finding,)
         else:
             document = original(content)
             if call is not None and Path(filename) == main:
@@ -270,8 +272,10 @@ def _reader(xacro: Any, main: Path, budget: Budget, call: ElementTree.Element | 
                     document.documentElement.setAttribute("name", main.stem)
             return document
         if Path(filename) != main:
-            found = tuple(replace(one, where={"file": filename, **one.where}) for one in found)
-        raise refusal(main, *found)
+            findings = tuple(
+                replace(finding, where={"file": filename, **finding.where}) for finding in findings
+            )
+        raise refusal(main, *findings)
 
     return read
 

@@ -31,14 +31,14 @@ class Part:
 
     once : whether only the first of its kind in one element counts
     when : which of the elements are noted; all by default
-    told : whether a finding of its own says more of it than its name"""
+    has_finding : whether a finding of its own says more of it than its name"""
 
     how: str
     why: str = ""
     attributes: Mapping[str, How] = field(default_factory=dict)
     once: bool = False
     when: Callable[[Element], bool] | None = None
-    told: bool = False
+    has_finding: bool = False
 
 
 Table = Mapping[str, Part]
@@ -58,8 +58,8 @@ def _idle(words: str) -> dict[str, How]:
 
 def _has_bounds(element: Element) -> bool:
     """Whether a <ros2_control> limits what it commands."""
-    found = element.iterfind("joint/command_interface/param")
-    return any(param.get("name") in ("min", "max") for param in found)
+    params = element.iterfind("joint/command_interface/param")
+    return any(param.get("name") in ("min", "max") for param in params)
 
 
 _LINKS = "a link is where its joint puts it"
@@ -132,12 +132,12 @@ URDF: Table = {
             "dynamics": _once("damping friction"),
             "mimic": _once("joint multiplier offset"),
             "calibration": Part(WITHOUT_EFFECT, "for finding the joint's zero"),
-            "safety_controller": Part(NOTED, "soft limits, unless <limit> is as narrow", told=True),
+            "safety_controller": Part(NOTED, "soft limits, unless <limit> is as narrow", has_finding=True),
         },
     ),
     "robot/material": _read("name"),
     **_below("robot/material", _COLOURS),
-    "robot/nmm": Part(READ, attributes={"platform": How(READ)}, told=True),
+    "robot/nmm": Part(READ, attributes={"platform": How(READ)}, has_finding=True),
     "robot/transmission": Part(WITHOUT_EFFECT, "inputs are rates of joints, not of motors"),
     "robot/gazebo": Part(WITHOUT_EFFECT, "for Gazebo"),
     "robot/ros2_control": Part(NOTED, "limits are those of <limit>", when=_has_bounds),
@@ -175,7 +175,7 @@ SRDF: Table = {
     "robot/disable_collisions": _read("link1 link2", _idle("reason")),
     "robot/enable_collisions": _read("link1 link2", _idle("reason")),
     "robot/disable_default_collisions": _read("link"),
-    "robot/joint_property": Part(NOTED, "where motion_model is not the platform's", told=True),
+    "robot/joint_property": Part(NOTED, "where motion_model is not the platform's", has_finding=True),
     "robot/link_sphere_approximation": Part(NOTED, "collision shapes are the robot's own"),
     "robot/end_effector": Part(WITHOUT_EFFECT, "tasks name their frame"),
     "robot/rotor_params": Part(NOTED, "motors' inertia is left out"),
@@ -213,27 +213,27 @@ def _walk(element: Element, path: str, table: Table, minor: int) -> Iterator[tup
     met: set[str] = set()
     for below in children(element, "*"):
         path_below = f"{path}/{below.tag}"
-        found = table.get(path_below)
+        entry = table.get(path_below)
         about = {"element": below.tag, "inside": element.tag}
-        if found is None and below.tag.startswith("xacro:"):
+        if entry is None and below.tag.startswith("xacro:"):
             continue  # which is told otherwise
-        if found is None:
+        if entry is None:
             near = _near(below.tag, _tags(path, table))
             yield _seen("element_unknown", **about, near=near), below.line
         elif below.tag in met or (met and element.tag == "geometry"):
             yield _seen("element_again", **about), below.line
-        elif found.how == NOTED and not found.told and (found.when is None or found.when(below)):
-            yield _seen("element_unread", **about, why=found.why), below.line
-        elif found.how == READ and not found.told:
+        elif entry.how == NOTED and not entry.has_finding and (entry.when is None or entry.when(below)):
+            yield _seen("element_unread", **about, why=entry.why), below.line
+        elif entry.how == READ and not entry.has_finding:
             yield from _walk(below, path_below, table, minor)
-        if found is not None and (found.once or element.tag == "geometry"):
+        if entry is not None and (entry.once or element.tag == "geometry"):
             met.add(below.tag)
 
 
 def _attribute(tag: str, name: str, how: How | None, part: Part, minor: int) -> _Seen | None:
     about = {"element": tag, "attribute": name}
     if how is None:
-        known = [one for one, other in part.attributes.items() if other.how == READ]
+        known = [key for key, other in part.attributes.items() if other.how == READ]
         return _seen("attribute_unknown", **about, near=_near(name, known))
     if how.since > minor:
         why = f"it counts from version 1.{how.since} on, and the file's is 1.{minor}"
@@ -243,7 +243,7 @@ def _attribute(tag: str, name: str, how: How | None, part: Part, minor: int) -> 
 
 def _tags(path: str, table: Table) -> list[str]:
     """The elements that are read right below one."""
-    below = (one.rpartition("/") for one, part in table.items() if part.how == READ)
+    below = (key.rpartition("/") for key, part in table.items() if part.how == READ)
     return [tag for above, _, tag in below if above == path]
 
 

@@ -153,7 +153,7 @@ def slipping_wheels(robot: Robot) -> dict[str, float]:
     if not plain or platform.n_p < 3:
         return {}
     own = platform.coordinate_limits[3:]
-    found: dict[str, float] = {}
+    speeds: dict[str, float] = {}
     for share in (0.5, 0.6):
         qp = np.zeros(platform.n_p)
         lower, upper = np.clip(own.T, -0.5, 0.5)
@@ -166,8 +166,8 @@ def slipping_wheels(robot: Robot) -> dict[str, float]:
             velocity = np.array([twists[0] - y * twists[2], twists[1] + x * twists[2]])
             sideways = float(np.abs(wheel.axis[:2] @ velocity).max(initial=0.0))
             if sideways > SLACK:
-                found[wheel.joint] = max(sideways, found.get(wheel.joint, 0.0))
-    return found
+                speeds[wheel.joint] = max(sideways, speeds.get(wheel.joint, 0.0))
+    return speeds
 
 
 def slip_warnings(robot: Robot) -> list[Finding]:

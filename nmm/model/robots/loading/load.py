@@ -102,14 +102,14 @@ def load(
     elif platform is not None:
         expect_kind(platform, Platform, "platform", "a Platform or its name")
     folders = [package_dirs] if isinstance(package_dirs, str | Path) else package_dirs
-    for given, kind, argument, expected in (
+    for value, kind, argument, expected in (
         (lock, Mapping, "lock", "a value for each joint's name"),
         (name, str, "name", "a string"),
         (limits, Mapping, "limits", "a value for each input's name"),
         (srdf, str | Path, "srdf", "a path"),
     ):
-        if given is not None and not isinstance(given, kind):
-            raise RobotError(where=argument, expected=expected, got=given)
+        if value is not None and not isinstance(value, kind):
+            raise RobotError(where=argument, expected=expected, got=value)
     if isinstance(srdf, str) and srdf.startswith(PACKAGE):
         srdf = package_file(srdf, folders)
     options = Options(

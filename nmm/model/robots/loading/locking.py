@@ -59,8 +59,8 @@ def add_pairs(model: pin.Model, geometry: pin.GeometryModel, split: int | None =
     only those of a shape before that index with one after."""
     joints = [shape.parentJoint for shape in geometry.geometryObjects]
     for i, j in combinations(range(len(joints)), 2):
-        one, other = joints[i], joints[j]
-        apart = one != other and model.parents[one] != other and model.parents[other] != one
+        first, second = joints[i], joints[j]
+        apart = first != second and model.parents[first] != second and model.parents[second] != first
         if apart and (split is None or i < split <= j):
             geometry.addCollisionPair(pin.CollisionPair(i, j))
 
@@ -91,17 +91,17 @@ def locked_values(
 def _named(
     lock: Mapping[str, float], free: Sequence[str], mimic_joints: Sequence[MimicJoint], where: str
 ) -> dict[str, float]:
-    """Values by joint: of a pattern's joints those that are not named themselves, and follow none of them."""
-    leaders = {one.joint: one.leader for one in first_leaders(mimic_joints)}
-    found: dict[str, float] = {}
+    """Values by joint: a pattern's for each match that follows no other match and is not named itself."""
+    leaders = {mimic.joint: mimic.leader for mimic in first_leaders(mimic_joints)}
+    values: dict[str, float] = {}
     for key, value in lock.items():
         if not is_pattern(key):
             continue
         matched = matching(key, free)
         if not matched:
             raise RobotError(f"no joint matches {key!r}", where=f"{where}: lock", got=key, available=free)
-        found |= {name: value for name in matched if leaders.get(name) not in matched}
-    return found | {key: value for key, value in lock.items() if not is_pattern(key)}
+        values |= {name: value for name in matched if leaders.get(name) not in matched}
+    return values | {key: value for key, value in lock.items() if not is_pattern(key)}
 
 
 def check_limits(model: pin.Model, name: str, value: float, where: str, more: str) -> None:
@@ -118,21 +118,21 @@ def among_coordinates(
 ) -> tuple[tuple[MimicJoint, ...], list[Finding]]:
     """The mimic joints that are coordinates, each by an independent leader, and notes; `RobotError` for one
     that follows a wheel or swivel (`rolling`), which the ground turns."""
-    found = tuple(one for one in first_leaders(mimic_joints) if one.joint not in rolling)
-    for one in found:
-        if one.leader in rolling:
+    followers = tuple(mimic for mimic in first_leaders(mimic_joints) if mimic.joint not in rolling)
+    for mimic in followers:
+        if mimic.leader in rolling:
             what = (
-                f"{one.joint} follows {one.leader}, which the ground turns and is no coordinate: lock "
-                f"{one.joint}, or name the wheels without {one.leader} (--wheels, wheels)"
+                f"{mimic.joint} follows {mimic.leader}, which the ground turns and is no coordinate: lock "
+                f"{mimic.joint}, or name the wheels without {mimic.leader} (--wheels, wheels)"
             )
-            raise RobotError(what, where=where, got=one.joint)
+            raise RobotError(what, where=where, got=mimic.joint)
     notes = []
-    if found:
-        notes.append(Finding("mimic_joints", {"names": [*map(str, found)]}))
-    if len(found) < len(mimic_joints):
-        turned = [one.joint for one in mimic_joints if one.joint in rolling]
+    if followers:
+        notes.append(Finding("mimic_joints", {"names": [*map(str, followers)]}))
+    if len(followers) < len(mimic_joints):
+        turned = [mimic.joint for mimic in mimic_joints if mimic.joint in rolling]
         notes.append(Finding("mimics_of_ground", {"names": turned}))
-    return found, notes
+    return followers, notes
 
 
 #: A slide with more room than this, m, is longer than arms have.
@@ -141,13 +141,13 @@ _LONG = 5.0
 
 def limit_notes(robot: Robot) -> list[Finding]:
     """Notes on the mimic joints whose limits are ignored, and on slides that no arm has."""
-    found = []
-    for one in robot.unheeded:
-        i = robot.coordinate(one.joint)
+    notes = []
+    for mimic in robot.unheeded:
+        i = robot.coordinate(mimic.joint)
         ends = robot.model.lowerPositionLimit, robot.model.upperPositionLimit
         limits = {name: float(end[i]) for name, end in zip(("lower", "upper"), ends, strict=True)}
-        values = {"mimic": str(one), "name": one.joint, "leader": one.leader, **limits}
-        found.append(Finding("mimic_limits_ignored", values))
+        values = {"mimic": str(mimic), "name": mimic.joint, "leader": mimic.leader, **limits}
+        notes.append(Finding("mimic_limits_ignored", values))
     rooms = dict(zip(robot.q_names, np.diff(robot.q_limits)[:, 0].tolist(), strict=True))
     slides = {
         name: rooms[name]
@@ -155,5 +155,5 @@ def limit_notes(robot: Robot) -> list[Finding]:
         if _LONG < rooms[name] < np.inf and not is_revolute(robot.model.joints[robot.model.getJointId(name)])
     }
     if slides:
-        found.append(Finding("slides_long", {"rooms": slides}))
-    return found
+        notes.append(Finding("slides_long", {"rooms": slides}))
+    return notes

@@ -115,7 +115,7 @@ class Measured:
 
     def _is_column(self, joint: int) -> bool:
         below = self.children(joint)
-        return bool(below) and all(self.why_not_rolling(one) is None for one in below)
+        return bool(below) and all(self.why_not_rolling(child) is None for child in below)
 
     def children(self, joint: int) -> list[int]:
         """The joints right below one."""
@@ -230,30 +230,30 @@ class Measured:
             for name in asked:
                 expect_known("wheel joint", name, self.joints, self.where, RobotError)
             candidates = asked if isinstance(asked, Mapping) else dict.fromkeys(asked)
-        found: dict[str, float | None] = {}
+        radii: dict[str, float | None] = {}
         notes: list[Finding] = []
         for name, radius in candidates.items():
             reason = why_not(name) if why_not else self.why_no_wheel(name, candidates, own)
             if reason is None:
-                found[name] = radius
+                radii[name] = radius
             elif asked is None:
                 notes.append(Finding("not_a_wheel", {"name": name, **reason}))
             else:
                 raise refusal(self.where, Finding("no_wheel", {"name": name, **reason}))
-        return found, notes
+        return radii, notes
 
     def _is_wheel(self, name: str, joint: int) -> bool:
         made_out = self.undercarriage
         return name in made_out.unnamed or (name not in made_out.aloft and self.is_named_wheel(joint))
 
-    def radius(self, joint: int, given: float | None = None) -> float:
+    def radius(self, joint: int, asked: float | None = None) -> float:
         """The radius, m: as given, or the centre's height over the root link's xy plane where a shape has
         that radius or none has one, or else the first shape's; NaN for none. `RobotError` for one given that
         is no length."""
         name = str(self.model.names[joint])
-        if given is not None:
+        if asked is not None:
             try:
-                return positive(given, f"wheels: radius of {name}")
+                return positive(asked, f"wheels: radius of {name}")
             except InputError as error:
                 raise error.at(self.where, RobotError) from None
         # A root link may stand on the ground (REP-120's base_footprint), or be some part of the body.

@@ -35,8 +35,8 @@ def measure_layout(measured: Measured, asked: Asked, steer: Collection[str] = ()
         if not measured.is_upright(measured.joints[name]):
             expected = "a joint that turns about an upright axis"
             raise RobotError(where=f"{measured.where}: steer", expected=expected, got=name)
-    given, _ = measured.wheels(asked, why_not=why_not)
-    radii = {joint: given[name] for name, joint in measured.joints.items() if name in given}
+    named, _ = measured.wheels(asked, why_not=why_not)
+    radii = {joint: named[name] for name, joint in measured.joints.items() if name in named}
     carrying = {joint for wheel in radii for joint in measured.above(wheel)}
 
     def counts(name: str, joint: int) -> bool:

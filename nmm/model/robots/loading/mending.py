@@ -35,7 +35,7 @@ def inertials(link: Element) -> list[ElementTree.Element]:
     if inertial is None:
         return []
     check_inertial(inertial, NOBODY, reader)
-    faulty = {one.values.get("missing", one.values["element"]) for one in reader.found}
+    faulty = {finding.values.get("missing", finding.values["element"]) for finding in reader.found}
     if not faulty:
         return [inertial]
     if faulty != {"inertia"}:
@@ -46,24 +46,24 @@ def inertials(link: Element) -> list[ElementTree.Element]:
     return [copied]
 
 
-def limit(given: Element) -> ElementTree.Element:
+def limit(element: Element) -> ElementTree.Element:
     """A joint's limits, without those of effort and velocity that are missing or wrong."""
-    copied = ElementTree.Element("limit", given.attrib)
+    copied = ElementTree.Element("limit", element.attrib)
     for attribute in ("effort", "velocity"):
-        if Attributes().number(given, attribute, minimum=0.0) is None:
+        if Attributes().number(element, attribute, minimum=0.0) is None:
             copied.set(attribute, NO_LIMIT)
     return copied
 
 
 def materials(parent: Element) -> list[Element]:
     """Those of a robot or of a shape that can be read."""
-    found = []
+    readable = []
     for material in children(parent, "material"):
         reader = Attributes()
         check_material(material, NOBODY, reader)
         if not reader.found:
-            found.append(material)
-    return found
+            readable.append(material)
+    return readable
 
 
 def with_shape(part: Element, shape: ElementTree.Element) -> ElementTree.Element:

@@ -65,8 +65,8 @@ def urdf_of(root: Element, file: Path) -> Converted:
 def _left_out(dropped: Iterable[Dropped]) -> list[Finding]:
     """What is left out, in a note with lines; each name once."""
     first: dict[str, Element] = {}
-    for one in dropped:
-        first.setdefault(one.name, one.element)
+    for part in dropped:
+        first.setdefault(part.name, part.element)
     if not first:
         return []
     lines = {name: line_in(element) for name, element in first.items()}
@@ -111,8 +111,8 @@ class _Writer:
             world = self._link("world")
             for body in moving or bodies:
                 self._body(body, body.place, world)
-        for one in self.mjcf.references:
-            self._couple(one)
+        for reference in self.mjcf.references:
+            self._couple(reference)
 
     def _drop(self, parts: Sequence[Body | Geom | Site], kind: str) -> None:
         """Things of the world that are not the robot's."""
@@ -200,7 +200,7 @@ class _Writer:
         _add(made, "axis", joint.element, xyz=_text(axis))
         ends = (f"-{NO_LIMIT}", NO_LIMIT) if joint.limits is None else map(repr, joint.limits)
         limits = {} if endless else dict(zip(("lower", "upper"), ends, strict=True))
-        effort = [one for one in (joint.effort, self.drives.effort.get(name)) if one is not None]
+        effort = [value for value in (joint.effort, self.drives.effort.get(name)) if value is not None]
         velocity = self.drives.velocity.get(name)
         limits["effort"] = repr(min(effort)) if effort else NO_LIMIT
         limits["velocity"] = NO_LIMIT if velocity is None else repr(velocity)

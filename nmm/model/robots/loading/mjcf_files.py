@@ -26,7 +26,9 @@ def _include(parent: Element, folder: Path, main: Path, seen: set[Path], depth: 
             continue
         name = part.get("file", "")
         # Beside the main file, or else beside the one that includes it.
-        file = next((one for one in (main.parent / name, folder / name) if one.is_file()), main.parent / name)
+        file = next(
+            (path for path in (main.parent / name, folder / name) if path.is_file()), main.parent / name
+        )
         place = {"file": name}
         if file.absolute() in seen:
             raise refusal(main, Finding("mjcf_included_twice", {}, place))
@@ -47,8 +49,8 @@ def parsed(file: Path, name: str, main: Path) -> Element:
     except XmlError as error:
         line = {**error.finding.where, **place}
         raise refusal(main, Finding(error.finding.code, error.finding.values, line)) from None
-    for one in cast("Iterator[Element]", root.iter()):
-        one.file = name
+    for element in cast("Iterator[Element]", root.iter()):
+        element.file = name
     return root
 
 

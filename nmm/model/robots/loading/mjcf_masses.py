@@ -60,7 +60,7 @@ class Masses:
         self._scale = 1.0
         total = self._numbers.number(compiler, "settotalmass", -1.0)
         if total > 0.0:
-            bodies = [one for body in mjcf.world.of(Body) for one in body.all()]
+            bodies = [body for top in mjcf.world.of(Body) for body in top.all()]
             self._scale = total / max(sum(self.of(body).mass for body in bodies), _NO_MASS)
 
     def of(self, body: Body) -> pin.Inertia:

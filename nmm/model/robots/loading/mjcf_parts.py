@@ -204,15 +204,15 @@ def line_in(element: Element) -> int | str:
 
 def _walk(element: Element, path: str) -> Iterator[tuple[str, str, Element]]:
     """Why, what and where, of an element and all in it."""
-    found = row_of(path)
+    entry = row_of(path)
     of_class = path.startswith("default/")
-    if found is None and of_class:
-        found = _of_class(element.tag)
+    if entry is None and of_class:
+        entry = _of_class(element.tag)
     tag = f"<{element.tag}>"
-    if found is None:
+    if entry is None:
         yield "not known to this version", tag, element
         return
-    row = found[1]
+    row = entry[1]
     if row.how == "noted":
         if not of_class:
             yield row.why, tag, element
@@ -230,7 +230,7 @@ def _walk(element: Element, path: str) -> Iterator[tuple[str, str, Element]]:
 def _of_class(tag: str) -> tuple[str, Row]:
     """The row of an element of a class: that of the elements to which it gives attributes."""
     paths = (*(f"{base}/{tag}" for base in ("body", "asset", "contact", "actuator")), tag)
-    path = next((one for one in paths if one in ELEMENTS), "asset/*" if tag == "texture" else "actuator/*")
+    path = next((path for path in paths if path in ELEMENTS), "asset/*" if tag == "texture" else "actuator/*")
     return path, ELEMENTS[path]
 
 

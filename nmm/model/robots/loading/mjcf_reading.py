@@ -78,9 +78,9 @@ def read_mjcf(root: Element, file: Path, faults: Attributes) -> Mjcf:
     include(root, file)
     model = _Model(root, file, PurePosixPath(), faults)
     world = Element("body")
-    world.extend(part for one in children(root, "worldbody") for part in one)
+    world.extend(part for section in children(root, "worldbody") for part in section)
     parts = [*model.contents(world, "main")]
-    keys = [key for one in children(root, "keyframe") for key in inside(one)]
+    keys = [key for section in children(root, "keyframe") for key in inside(section)]
     name = root.get("model") or file.stem
     body = Body(world, "world", pin.SE3.Identity(), parts)
     return Mjcf(name, model.settings, body, model.references, keys, model.left_out)
@@ -93,33 +93,39 @@ class _Model:
         self._root, self._file, self._folder, self._faults = root, file, folder, faults
         self.left_out: list[Dropped] = []
         self.settings = {key: usual for key, (usual, _) in _SETTINGS.items()}
-        for one in children(root, "compiler"):
-            self.settings |= one.attrib
+        for compiler in children(root, "compiler"):
+            self.settings |= compiler.attrib
         for key, (usual, pattern) in _SETTINGS.items():
             if not re.fullmatch(pattern, self.settings[key]):
-                element = next((one for one in children(root, "compiler") if one.get(key)), None)
+                element = next(
+                    (compiler for compiler in children(root, "compiler") if compiler.get(key)), None
+                )
                 faults.add(element, "mjcf_unread", what=f"<compiler {key}={self.settings[key]!r}>")
                 self.settings[key] = usual
         self._numbers = Numbers(self.settings, faults)
         self._classes: dict[str, _Class] = {"main": {}}
-        for one in children(root, "default"):
-            self._read_class(one, "main", {})
-            self._classes[one.get("class", "main")] = self._classes["main"]
-        assets = [part for one in children(root, "asset") for part in inside(one)]
-        meshes = [self._with_defaults(one, "main") for one in assets if one.tag == "mesh"]
+        for default in children(root, "default"):
+            self._read_class(default, "main", {})
+            self._classes[default.get("class", "main")] = self._classes["main"]
+        assets = [part for section in children(root, "asset") for part in inside(section)]
+        meshes = [self._with_defaults(asset, "main") for asset in assets if asset.tag == "mesh"]
         self._elements = Elements(
             self._numbers,
             self.settings,
-            {one.get("name", _stem(one)): one for one in meshes},
-            {one.get("name", ""): one.get("rgba") for one in assets if one.tag == "material"},
+            {mesh.get("name", _stem(mesh)): mesh for mesh in meshes},
+            {
+                material.get("name", ""): material.get("rgba")
+                for material in assets
+                if material.tag == "material"
+            },
             folder,
         )
-        self._models = {one.get("name", _stem(one)): one for one in assets if one.tag == "model"}
+        self._models = {model.get("name", _stem(model)): model for model in assets if model.tag == "model"}
         self.references = [
-            self._with_defaults(one, "main", section)
+            self._with_defaults(element, "main", section)
             for section in _SECTIONS
             for parent in children(root, section)
-            for one in inside(parent)
+            for element in inside(parent)
         ]
 
     def _read_class(self, element: Element, name: str, above: _Class) -> None:
@@ -141,8 +147,8 @@ class _Model:
         <actuator>."""
         name = element.get("class", childclass)
         self._faults.choice(element, name, [*self._classes], "default class", {})
-        given = self._classes.get(name, {})
-        values = {**given.get(section or element.tag, {})}
+        defaults = self._classes.get(name, {})
+        values = {**defaults.get(section or element.tag, {})}
         _override(values, element.attrib)
         made = Element(element.tag, {key: value.strip() for key, value in values.items()})
         made.extend(element)
@@ -201,7 +207,7 @@ class _Model:
             place = place * at(offset)
 
     def _follow(self, names: set[tuple[str, str]], ends: Sequence[str]) -> None:
-        """What speaks of replicas alone is said of each, as in MuJoCo; what also speaks of others of none."""
+        """References to replicas alone are repeated for each, as in MuJoCo; mixed ones are left out."""
         made: list[Element] = []
         for element in self.references:
             spoken = {key: (_NAMES[key], name) for key, name in element.attrib.items() if key in _NAMES}
@@ -229,19 +235,21 @@ class _Model:
         folder = self._folder / PurePosixPath(asset.get("file", "")).parent
         other = _Model(inner, file, folder, self._faults)
         world = Element("body")
-        world.extend(part for one in children(inner, "worldbody") for part in one)
+        world.extend(part for section in children(inner, "worldbody") for part in section)
         wanted = [(key, value) for key in ("body", "frame") if (value := element.get(key))]
         for key, value in wanted:
-            found = [one for one in inside(world, deep=True) if one.tag == key and one.get("name") == value]
-            self._faults.choice(element, value, [value] if found else [], key, {"part": "<attach>"})
-            world[:] = found[:1]
+            matches = [
+                part for part in inside(world, deep=True) if part.tag == key and part.get("name") == value
+            ]
+            self._faults.choice(element, value, [value] if matches else [], key, {"part": "<attach>"})
+            world[:] = matches[:1]
         parts = [renamed(part, lambda _, name: prefix + name) for part in other.contents(world, "main")]
         names = names_in(parts)
-        for one in other.references:
-            spoken = {key: prefix + value for key, value in one.attrib.items() if key in _NAMES}
+        for reference in other.references:
+            spoken = {key: prefix + value for key, value in reference.attrib.items() if key in _NAMES}
             if spoken and all((_NAMES[key], value) in names for key, value in spoken.items()):
-                self.references.append(_renamed(one, spoken))
-        for frame in (key for one in children(inner, "keyframe") for key in inside(one)):
+                self.references.append(_renamed(reference, spoken))
+        for frame in (key for section in children(inner, "keyframe") for key in inside(section)):
             self.left_out.append(Dropped(f"keyframe {frame.get('name', '')} of {name}", frame))
         self.left_out += other.left_out
         yield from parts

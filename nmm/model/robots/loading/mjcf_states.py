@@ -28,14 +28,14 @@ class Drives:
 
 
 def drives_of(mjcf: Mjcf, faults: Attributes) -> Drives:
-    """What the one actuator of a joint bounds: a velocity actuator's range of control the velocity; that of a
-    motor, and any range of force, the effort. That a position actuator asks for less is told."""
+    """The limits that a joint's only actuator sets: of velocity, a velocity actuator's range of control; of
+    effort, a motor's, and any range of force. A note says where a position actuator's range is narrower."""
     drives = Drives()
     limits = {joint.name: joint.limits for body in mjcf.world.all() for joint in body.joints if joint.name}
     automatic = mjcf.settings["autolimits"] == "true"
     places: dict[str, Element] = {}
     narrow: dict[str, list[float]] = {}
-    driven = Counter(one.get("joint") for one in mjcf.references)
+    driven = Counter(element.get("joint") for element in mjcf.references)
     for element in mjcf.references:
         joint = element.get("joint", "")
         if element.tag not in _DRIVES or joint not in limits or driven[joint] > 1:
@@ -46,8 +46,8 @@ def drives_of(mjcf: Mjcf, faults: Attributes) -> Drives:
         control, force = (_range(element, kind, automatic, faults) for kind in ("ctrl", "force"))
         if element.tag == "velocity" and control is not None and (bound := _both_ways(control)):
             drives.velocity[joint] = bound / abs(gear)
-        given = [force, control if element.tag == "motor" else None]
-        efforts = [bound * abs(gear) for one in given if one is not None and (bound := _both_ways(one))]
+        ranges = [force, control if element.tag == "motor" else None]
+        efforts = [bound * abs(gear) for ends in ranges if ends is not None and (bound := _both_ways(ends))]
         if efforts:
             drives.effort[joint] = min(efforts)
         if element.tag == "position" and control is not None:
@@ -93,8 +93,8 @@ def states_of(mjcf: Mjcf, file: Path, qpos: Sequence[tuple[str, Joint]]) -> tupl
             notes.append(Finding("mjcf_keyframe", {"name": name, "size": size, "got": got}, key.place))
             continue
         states[name] = _state(values, qpos)
-    excluded = [one for one in mjcf.references if one.tag == "exclude"]
-    pairs = tuple((one.get("body1", ""), one.get("body2", "")) for one in excluded)
+    excluded = [element for element in mjcf.references if element.tag == "exclude"]
+    pairs = tuple((element.get("body1", ""), element.get("body2", "")) for element in excluded)
     return (Srdf(file, states, {}, pairs, ()) if states or pairs else None), notes
 
 

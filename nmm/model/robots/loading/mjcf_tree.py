@@ -121,16 +121,16 @@ def renamed(part: Part, rename: Rename) -> Part:
         return part
     name = part.name and rename(type(part).__name__.lower(), part.name)
     if isinstance(part, Body):
-        return replace(part, name=name, parts=[renamed(one, rename) for one in part.parts])
+        return replace(part, name=name, parts=[renamed(child, rename) for child in part.parts])
     return replace(part, name=name)
 
 
 def names_in(parts: list[Part]) -> set[tuple[str, str]]:
-    """Kind and name of all that has a name there."""
-    found: set[tuple[str, str]] = set()
+    """Kind and name of all parts that have a name, and of all in them."""
+    names: set[tuple[str, str]] = set()
     for part in parts:
         if not isinstance(part, Inertial) and part.name:
-            found.add((type(part).__name__.lower(), part.name))
+            names.add((type(part).__name__.lower(), part.name))
         if isinstance(part, Body):
-            found |= names_in(part.parts)
-    return found
+            names |= names_in(part.parts)
+    return names

@@ -131,11 +131,11 @@ def _mounted(
         arguments={**base.arguments, **{f"{key}.{k}": value for k, value in arm.arguments.items()}},
         notes=(*parts.notes, *notes, Finding("arm_mounted", mounted)),
         provenance=provenance,
-        mimic_joints=(*base.mimic_joints, *(one.renamed(prefix) for one in arm.mimic_joints)),
+        mimic_joints=(*base.mimic_joints, *(mimic.renamed(prefix) for mimic in arm.mimic_joints)),
     )
 
     def pairs(model: pin.Model, geometry: pin.GeometryModel) -> None:
-        """Those of both robots, by the shapes' places, and those of the one's shapes with the other's."""
+        """The pairs of both robots, by the shapes' indices, and those of one's shapes with the other's."""
         geometry.removeAllCollisionPairs()
         count = platform.collision.ngeoms
         for pair in base.shapes.collision_model.collisionPairs:
@@ -147,27 +147,27 @@ def _mounted(
     wheels = {wheel.joint: wheel.radius for wheel in base.wheels}
     robot = robot_from(source, Options(base.platform, wheels, add_pairs=pairs))
     own = {key: getattr(provenance, key) for key in ("locked", "mimicked", "platform")}
-    kept = replace(robot.parts, provenance=replace(robot.parts.provenance, **own))
+    new_parts = replace(robot.parts, provenance=replace(robot.parts.provenance, **own))
     semantics = base.semantics.with_arm(arm.semantics, prefix, joints)
     arms = {**base.arms, key: joints}
-    return replace(robot, **robot.shapes._asdict(), arms=arms, semantics=semantics, parts=kept)
+    return replace(robot, **robot.shapes._asdict(), arms=arms, semantics=semantics, parts=new_parts)
 
 
-def _prefix(base: Robot, arm: Robot, platform: _Body, body: _Body, given: str | None) -> tuple[str, str]:
+def _prefix(base: Robot, arm: Robot, platform: _Body, body: _Body, prefix: str | None) -> tuple[str, str]:
     """The prefix of the arm's names, and what the arm is called."""
-    if given is not None and not isinstance(given, str):
-        raise RobotError(where="prefix", expected="text", got=given)
+    if prefix is not None and not isinstance(prefix, str):
+        raise RobotError(where="prefix", expected="text", got=prefix)
     taken = {*_GROUPS, *base.arms, *base.u_names}
-    clashes = _clashes(base, platform, body, given or "")
-    if given is not None and clashes:
+    clashes = _clashes(base, platform, body, prefix or "")
+    if prefix is not None and clashes:
         what = f"with it {base.name} and {arm.name} would both have {few(clashes)}"
-        raise RobotError(what, where="prefix", expected="one that keeps names apart", got=given)
-    stem = (given or "").rstrip("_/.-: ") or arm.name
+        raise RobotError(what, where="prefix", expected="one that keeps names apart", got=prefix)
+    stem = (prefix or "").rstrip("_/.-: ") or arm.name
     key, count = stem, 0 if stem in _GROUPS else 1
     while key in taken or (clashes and _clashes(base, platform, body, f"{key}_")):
         count += 1
         key = f"{stem}_{count}"
-    return f"{key}_" if clashes else given or "", key
+    return f"{key}_" if clashes else prefix or "", key
 
 
 def _clashes(base: Robot, platform: _Body, body: _Body, prefix: str) -> list[str]:
@@ -179,12 +179,12 @@ def _clashes(base: Robot, platform: _Body, body: _Body, prefix: str) -> list[str
 
 def _frame(base: Robot, at: str | None) -> str:
     if at is None:
-        found = [name for name in _PLACES if name in base.frames]
-        if len(found) != 1:
-            what = f"found {', '.join(found)}" if found else f"none is named {', '.join(_PLACES)}"
+        places = [name for name in _PLACES if name in base.frames]
+        if len(places) != 1:
+            what = f"found {', '.join(places)}" if places else f"none is named {', '.join(_PLACES)}"
             what = f"which frame of {base.name} carries the arm? {what}"
             raise RobotError(what, where="at", available=base.frames)
-        return found[0]
+        return places[0]
     expect_known("frame", at, base.frames, f"at: {base.name}", RobotError)
     return at
 
@@ -226,8 +226,8 @@ def _pose(placement: pin.SE3 | ArrayLike | Sequence[ArrayLike] | None) -> pin.SE
                 for part, name in zip(placement, ("xyz", "rpy"), strict=True)
             )
             return pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz)
-        given: Any = placement.homogeneous if isinstance(placement, pin.SE3) else placement
-        matrix = array(given, "placement")
+        values: Any = placement.homogeneous if isinstance(placement, pin.SE3) else placement
+        matrix = array(values, "placement")
     except InputError as error:
         raise error.placed(error.where, RobotError) from None
     if matrix.shape != (4, 4):

@@ -33,28 +33,28 @@ class Packages:
     def __init__(self, file: Path, folders: Sequence[str | Path] = ()) -> None:
         # os.path answers where pathlib raises: an unknown home, a name too long for the file system.
         named = [named_folder(str(folder)) for folder in folders]
-        given = [(name, Path(os.path.expanduser(folder)).absolute()) for name, folder in named]
-        for _, folder in given:
+        absolute = [(name, Path(os.path.expanduser(folder)).absolute()) for name, folder in named]
+        for _, folder in absolute:
             if not os.path.isdir(folder):
                 raise RobotError(f"{folder} is no folder", where="package_dirs", got=str(folder))
         self.file = file.absolute()
-        unnamed = [folder for name, folder in given if not name]
+        unnamed = [folder for name, folder in absolute if not name]
         self.folders = (*unnamed, *_environment_folders(), *_share_folders())
         #: Where MuJoCo looks for meshes, as the file says it.
         self.mesh_folder: str | None = None
         self.nearby: dict[str, Path] = {}
         self.searched = (*self.folders, *self.file.parents)
         self.found: dict[str, Path | None] = {}
-        self._folders = {name: [folder] for name, folder in given if name}
-        self.found.update((name, folder) for name, folder in given if name)
+        self._folders = {name: [folder] for name, folder in absolute if name}
+        self.found.update((name, folder) for name, folder in absolute if name)
 
     def find(self, package: str, asking: Path | None = None) -> Path | None:
         """The folder of a package, or the nearest above the file that asks, with what that names in it."""
-        found = next(iter(self._candidates(package)), None)
-        if found is None and asking is not None:
+        match = next(iter(self._candidates(package)), None)
+        if match is None and asking is not None:
             named = re.findall(rf"\$\(find\s+{re.escape(package)}\)/([^\s\"'<>$]+)", read_text(asking))
             # A bare name is asked for nearby only: five folders up, a stranger's file may have it.
-            found = next(
+            match = next(
                 (
                     folder
                     for up, folder in enumerate(asking.absolute().parents[:_NEAR])
@@ -63,10 +63,10 @@ class Packages:
                 ),
                 None,
             )
-            if found is not None:
-                self.nearby[package] = self.found[package] = found
-                self._folders[package] = [found]
-        return found
+            if match is not None:
+                self.nearby[package] = self.found[package] = match
+                self._folders[package] = [match]
+        return match
 
     def mesh(self, name: str) -> Path | Finding:
         """The file of a package://, model://, file://, absolute or relative mesh name; or "mesh_missing"."""
@@ -86,10 +86,10 @@ class Packages:
             paths = (Path(rest), Path(unquote(rest)))
         else:
             missing = {"cause": "scheme", "scheme": scheme}
-        found = next((path.absolute() for path in paths if os.path.isfile(path)), None)
-        if found is None and missing["cause"] != "scheme":
-            found = self._of_mujoco(name) or self._nearby(name, rest if separator else name)
-        return found or Finding("mesh_missing", {"mesh": name, **missing})
+        file = next((path.absolute() for path in paths if os.path.isfile(path)), None)
+        if file is None and missing["cause"] != "scheme":
+            file = self._of_mujoco(name) or self._nearby(name, rest if separator else name)
+        return file or Finding("mesh_missing", {"mesh": name, **missing})
 
     def _of_mujoco(self, name: str) -> Path | None:
         """The file where MuJoCo would find it, by its whole relative name or, as usual, by its last part."""
@@ -106,10 +106,10 @@ class Packages:
         ends = [parts[start:] for start in range(max(1, len(parts) - 1))]
         above = self.file.parents[: _NEAR if len(parts) > 1 else 1]
         paths = (folder.joinpath(*end) for end in ends for folder in above)
-        found = next((path for path in paths if os.path.isfile(path)), None)
-        if found is not None:
-            self.nearby[name] = found
-        return found
+        file = next((path for path in paths if os.path.isfile(path)), None)
+        if file is not None:
+            self.nearby[name] = file
+        return file
 
     @property
     def notes(self) -> list[Finding]:
@@ -146,12 +146,12 @@ def _environment_folders() -> list[Path]:
 def package_file(name: str, folders: Sequence[str | Path] = ()) -> Path:
     """The file of a name package://PACKAGE/PATH; `RobotError` lists the folders searched, yours first."""
     packages = Packages(Path(os.sep), folders)  # there is no file yet beside which to search
-    found = packages.mesh(name)
-    if isinstance(found, Path):
-        return found
-    if found.values["cause"] == "package":
-        found = packages.missing(found.values["package"], PACKAGE)
-    raise refusal(name, found)
+    answer = packages.mesh(name)
+    if isinstance(answer, Path):
+        return answer
+    if answer.values["cause"] == "package":
+        answer = packages.missing(answer.values["package"], PACKAGE)
+    raise refusal(name, answer)
 
 
 @cache

@@ -32,10 +32,12 @@ def find_wheels(
 
 def differing_radii(measured: Measured, asked: Asked) -> Iterator[Finding]:
     """Where a wheel's given radius, m, is not that of any of its shapes (1 mm or 1 % may differ)."""
-    for name, given in asked.items() if isinstance(asked, Mapping) else ():
-        radii = [] if given is None else [tyre.radius for tyre in measured.tyres(measured.joints[name])]
-        if radii and all(abs(given - one) > max(1e-3, ROUNDED * one) for one in radii):
-            yield Finding("wheel_radius_differs", {"name": name, "given": float(given), "measured": radii[0]})
+    for name, radius in asked.items() if isinstance(asked, Mapping) else ():
+        radii = [] if radius is None else [tyre.radius for tyre in measured.tyres(measured.joints[name])]
+        if radii and all(abs(radius - other) > max(1e-3, ROUNDED * other) for other in radii):
+            yield Finding(
+                "wheel_radius_differs", {"name": name, "given": float(radius), "measured": radii[0]}
+            )
 
 
 def differing_tyres(measured: Measured, names: Iterable[str]) -> Iterator[Finding]:

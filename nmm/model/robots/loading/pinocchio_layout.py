@@ -241,8 +241,8 @@ class PinocchioLayout:
         if name == "fixed":
             return None
         ours, theirs = (
-            {f.name: f for f in one.frames if f.parentJoint == root and f.type == pin.FrameType.BODY}
-            for one, root in ((robot.model, 3), (model, self._head))
+            {f.name: f for f in pin_model.frames if f.parentJoint == root and f.type == pin.FrameType.BODY}
+            for pin_model, root in ((robot.model, 3), (model, self._head))
         )
         shared = next((name for name in ours if name in theirs), None)
         offset = pin.SE3.Identity()
@@ -260,7 +260,7 @@ class PinocchioLayout:
         held = robot.locked
         standing = {name for wheel in robot.wheels for name in wheel.joints}
         own = list(robot.q_names[0 if self._root is None else 3 :])
-        following = [one.joint for one in robot.mimic_joints]
+        following = [mimic.joint for mimic in robot.mimic_joints]
         pairs, still = [], {}
         for joint in range(self._head + 1, model.njoints):
             name = robot.renamed.get(str(model.names[joint]), str(model.names[joint]))
@@ -289,9 +289,9 @@ class PinocchioLayout:
     def _sign(self, joint: int, name: str) -> float:
         """-1 where the robot's joint has the opposite axis: a platform's own points up (`load`)."""
         ours, theirs = self.robot.model, self.model
-        one = twist(ours.joints[ours.getJointId(name)], pin.neutral(ours))
-        other = twist(theirs.joints[joint], pin.neutral(theirs))
-        return math.copysign(1.0, float(np.vdot(one, other)))
+        our_twist = twist(ours.joints[ours.getJointId(name)], pin.neutral(ours))
+        their_twist = twist(theirs.joints[joint], pin.neutral(theirs))
+        return math.copysign(1.0, float(np.vdot(our_twist, their_twist)))
 
     def _is_angle(self, joint: int) -> bool:
         return is_continuous(self.model.joints[joint])
@@ -315,7 +315,7 @@ def _rows(value: ArrayLike, length: int, name: str, count: int | None = None) ->
     rows = array(value, name)
     if rows.ndim not in (1, 2) or rows.shape[-1] != length:
         raise InputError(where=name, expected=f"{length} numbers, or rows of them", got=rows)
-    found = rows.reshape(-1, length)
-    if count is not None and len(found) != count:
-        raise InputError(where=name, expected=f"{count} rows", got=len(found))
-    return found, rows.ndim == 1
+    table = rows.reshape(-1, length)
+    if count is not None and len(table) != count:
+        raise InputError(where=name, expected=f"{count} rows", got=len(table))
+    return table, rows.ndim == 1

@@ -109,14 +109,14 @@ def accelerations_of(robot: Robot) -> dict[str, float]:
         for name, i in zip(robot.u_names, robot.rate_coordinates, strict=True)
         if i >= 0
     }
-    leaders = {one.joint: (one.leader, abs(one.multiplier)) for one in robot.mimic_joints}
-    found: dict[str, float] = {}
+    leaders = {mimic.joint: (mimic.leader, abs(mimic.multiplier)) for mimic in robot.mimic_joints}
+    limits: dict[str, float] = {}
     for joint, limit in provenance_of(robot).accelerations.items():
         leader, factor = leaders.get(joint, (joint, 1.0))
         if leader in inputs and factor > 0.0:
             name = inputs[leader]
-            found[name] = min(found.get(name, np.inf), limit / factor)
-    return found
+            limits[name] = min(limits.get(name, np.inf), limit / factor)
+    return limits
 
 
 def acceleration_notes(robot: Robot) -> list[Finding]:

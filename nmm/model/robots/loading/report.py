@@ -69,31 +69,31 @@ def file_report(
     """
     expect_known("missing_meshes", options.get("missing_meshes", "skip"), ("error", "skip"), error=RobotError)
     file = Path(path).expanduser()
-    given: Mapping[str, Any] = {"arguments": arguments, "package_dirs": package_dirs}
+    settings: Mapping[str, Any] = {"arguments": arguments, "package_dirs": package_dirs}
     try:
-        description = describe(file, **given)
+        description = describe(file, **settings)
     except RobotError as error:
         if not error.findings:  # what the caller gave is wrong, not what is in the file
             raise
-        return _unread(file, error.findings, given)
-    return _report(description, {**given, **options})
+        return _unread(file, error.findings, settings)
+    return _report(description, {**settings, **options})
 
 
-def _unread(file: Path, found: tuple[Finding, ...], given: Mapping[str, Any]) -> FileReport:
+def _unread(file: Path, findings: tuple[Finding, ...], settings: Mapping[str, Any]) -> FileReport:
     """The report of a file that xacro or the decoder stops at, with every missing package."""
-    if all(one.code != "package_missing" for one in found):
-        return FileReport(file, problems=found)
-    packages = _Going(file, given["package_dirs"])
+    if all(finding.code != "package_missing" for finding in findings):
+        return FileReport(file, problems=findings)
+    packages = _Going(file, settings["package_dirs"])
     description = None
     # What is included from a package that is not there is not there either.
     with suppress(RobotError):
-        xml, used, _ = expand(file.absolute(), argument_texts(given["arguments"]), packages)
+        xml, used, _ = expand(file.absolute(), argument_texts(settings["arguments"]), packages)
         description = Description(xml, file, packages, expanded=True, arguments=used)
     lost = [name for name, folder in packages.found.items() if folder is None]
     problems = [packages.missing(name, f"$(find {name})") for name in lost]
     if description is None:
         return FileReport(file, problems=tuple(problems))
-    return _report(description, given, problems)
+    return _report(description, settings, problems)
 
 
 class _Going(Packages):
@@ -103,22 +103,24 @@ class _Going(Packages):
         return super().find(package, asking) or Path(_NOWHERE, package)
 
 
-def _report(description: Description, given: Mapping[str, Any], found: Sequence[Finding] = ()) -> FileReport:
-    """The report of a description that could be read; `given` is for `load`, `found` are its problems."""
-    packages, asked = description.packages, given.get("missing_meshes")
+def _report(
+    description: Description, settings: Mapping[str, Any], findings: Sequence[Finding] = ()
+) -> FileReport:
+    """The report of a description that could be read; `settings` are for `load`, `findings` its problems."""
+    packages, asked = description.packages, settings.get("missing_meshes")
     meshes: dict[str, Path | Finding] = {}
 
     def find_mesh(name: str) -> Path | None:
         mesh = meshes[name] = packages.mesh(name)
         return mesh if isinstance(mesh, Path) else None
 
-    checked, problems = inspect(description.urdf, find_mesh, given.get("lock") or ())
+    checked, problems = inspect(description.urdf, find_mesh, settings.get("lock") or ())
     warnings, facts = [*description.notes], dict[str, str]()
     robot = None
     if checked is not None:
         root = checked.root
         missing = {name: mesh for name, mesh in meshes.items() if isinstance(mesh, Finding)}
-        problems += found
+        problems += findings
         warnings += [*checked.spared, *packages.notes, *description.placed(checked.unread)]
         (problems if asked == "error" else warnings).extend(_missing_meshes(root, missing, asked))
         if not isinstance(packages, _Going):
@@ -131,10 +133,10 @@ def _report(description: Description, given: Mapping[str, Any], found: Sequence[
             facts["packages"] = "; ".join(folders)
     if checked is not None and not problems:
         warnings += advice(root)
-        robot, problems = _loaded(description.path, given)
+        robot, problems = _loaded(description.path, settings)
     if robot is not None:
         top, ground = _top(root), Ground.of(robot) if robot.platform.coordinates else None
-        warnings += [one for one in robot.notes if one.code == "names_taken"]
+        warnings += [note for note in robot.notes if note.code == "names_taken"]
         warnings += [*wheel_advice(robot), *limit_notes(robot), *acceleration_notes(robot)]
         warnings += [*provenance_of(robot).contradictions, *robot.semantics.notes]
         warnings += [] if ground is None else ground.warnings(robot)
@@ -153,14 +155,14 @@ def _report(description: Description, given: Mapping[str, Any], found: Sequence[
 def _missing_meshes(root: Element, missing: Mapping[str, Finding], asked: str | None) -> list[Finding]:
     """The missing meshes, each at its first line, and what becomes of their shapes."""
     becomes = {"shape": {"skip": "left_out", "error": "", None: "refused"}[asked]}
-    found: dict[str, Finding] = {}
+    findings: dict[str, Finding] = {}
     for mesh in root.iter("mesh"):
         name = mesh.get("filename", "")
         lost = missing.get(name)
         if lost is not None and _NOWHERE not in name and isinstance(mesh, Element):
             values = {**lost.values, **becomes}
-            found.setdefault(name, replace(lost, values=values, where=mesh.place))
-    return [*found.values()]
+            findings.setdefault(name, replace(lost, values=values, where=mesh.place))
+    return [*findings.values()]
 
 
 def _facts_of_file(description: Description, root: Element) -> dict[str, str]:
@@ -175,10 +177,10 @@ def _facts_of_file(description: Description, root: Element) -> dict[str, str]:
     return facts
 
 
-def _loaded(path: Path, given: Mapping[str, Any]) -> tuple[Robot | None, list[Finding]]:
+def _loaded(path: Path, settings: Mapping[str, Any]) -> tuple[Robot | None, list[Finding]]:
     """The robot with all its meshes, or what is wrong when it is loaded."""
     try:
-        robot = load(path, **{**given, "missing_meshes": "skip"})
+        robot = load(path, **{**settings, "missing_meshes": "skip"})
         for shapes in robot.shapes:
             read_meshes(shapes.geometryObjects, robot.name)
     except InputError as error:

@@ -80,10 +80,10 @@ def read_file(
     meshes: dict[str, Path | None] = {}
 
     def find_mesh(name: str) -> Path | Finding | None:
-        found = packages.mesh(name)
-        if isinstance(found, Finding) and missing_meshes == "error":
-            return found
-        return meshes.setdefault(name, None if isinstance(found, Finding) else found)
+        answer = packages.mesh(name)
+        if isinstance(answer, Finding) and missing_meshes == "error":
+            return answer
+        return meshes.setdefault(name, None if isinstance(answer, Finding) else answer)
 
     checked, problems = inspect(description.urdf, find_mesh, lock)
     if checked is None or problems:
@@ -116,13 +116,13 @@ def read_file(
     )
 
 
-def _spared(found: Sequence[Finding]) -> list[Finding]:
+def _spared(faults: Sequence[Finding]) -> list[Finding]:
     """Notes on faults that were spared: each joint that follows none, and how many others there are."""
-    told = [one for one in found if one.code == "leader_unknown"]
-    others = [one for one in found if one.code != "leader_unknown"]
+    notes = [fault for fault in faults if fault.code == "leader_unknown"]
+    others = [fault for fault in faults if fault.code != "leader_unknown"]
     if others:
-        told.append(Finding("faults_spared", {"count": len(others), "first": str(others[0])}))
-    return told
+        notes.append(Finding("faults_spared", {"count": len(others), "first": str(others[0])}))
+    return notes
 
 
 def read_model(
@@ -217,8 +217,8 @@ def _for_pinocchio(checked: CheckedUrdf) -> tuple[str, _StandIns]:
         kind = joint.get("type", "")
         copied = ElementTree.SubElement(root, "joint", name=joint.get("name", ""), type=kind)
         for tag in _JOINT_PARTS if kind == "fixed" else _JOINT_PARTS + _MOVING_PARTS:
-            if (found := child(joint, tag)) is not None:
-                copied.append(mending.limit(found) if tag == "limit" else found)
+            if (element := child(joint, tag)) is not None:
+                copied.append(mending.limit(element) if tag == "limit" else element)
     return ElementTree.tostring(root, encoding="unicode"), stand_ins
 
 

@@ -46,29 +46,34 @@ def read_srdf(
         raise refusal(f"srdf: {path}", Finding("not_srdf", {"got": root.tag}))
     states: dict[str, dict[str, tuple[float, ...]]] = {}
     for state in root.iter("group_state"):
-        found = states.setdefault(_attribute(state, "name", path), {})
+        values = states.setdefault(_attribute(state, "name", path), {})
         for joint in state.iter("joint"):
-            found[_attribute(joint, "name", path)] = _numbers(joint, path)
+            values[_attribute(joint, "name", path)] = _numbers(joint, path)
     groups = {_attribute(group, "name", path): _group(group, path) for group in root.findall("group")}
     disabled, enabled = (
-        tuple((_attribute(one, "link1", path), _attribute(one, "link2", path)) for one in root.iter(tag))
+        tuple(
+            (_attribute(element, "link1", path), _attribute(element, "link2", path))
+            for element in root.iter(tag)
+        )
         for tag in ("disable_collisions", "enable_collisions")
     )
     untouched, passive = (
-        tuple(_attribute(one, name, path) for one in root.findall(tag))
+        tuple(_attribute(element, name, path) for element in root.findall(tag))
         for tag, name in (("disable_default_collisions", "link"), ("passive_joint", "name"))
     )
     motions = {
-        one.get("joint_name", "").strip(): one.get("value", "").strip()
-        for one in root.findall("joint_property")
-        if one.get("property_name", "").strip() == "motion_model"
+        element.get("joint_name", "").strip(): element.get("value", "").strip()
+        for element in root.findall("joint_property")
+        if element.get("property_name", "").strip() == "motion_model"
     }
     roots = []
-    for one in root.iter("virtual_joint"):
-        name, kind = _attribute(one, "name", path), one.get("type", "planar").strip().lower()
-        roots.append(VirtualJoint(name, kind, one.get("child_link", "").strip(), motions.get(name, "")))
+    for element in root.iter("virtual_joint"):
+        name, kind = _attribute(element, "name", path), element.get("type", "planar").strip().lower()
+        roots.append(VirtualJoint(name, kind, element.get("child_link", "").strip(), motions.get(name, "")))
     place = {"srdf": path.name}
-    notes = (replace(one, where=place if is_xacro else {**one.where, **place}) for one in unread(root, SRDF))
+    notes = (
+        replace(note, where=place if is_xacro else {**note.where, **place}) for note in unread(root, SRDF)
+    )
     return Srdf(path, states, groups, disabled, tuple(roots), enabled, untouched, passive, tuple(notes))
 
 
@@ -79,8 +84,8 @@ def srdf_beside(file: Path, robot: str) -> Path | None:
     named = (folder / f"{stem}{suffix}" for suffix in SUFFIXES for folder in folders)
     same = [path for path in named if path.is_file()][:1]
     if not same:
-        there = (path for folder in folders[:2] for path in sorted(folder.glob(f"*{SUFFIXES[0]}")))
-        same = [path for path in there if _is_of(path, robot)]
+        nearby = (path for folder in folders[:2] for path in sorted(folder.glob(f"*{SUFFIXES[0]}")))
+        same = [path for path in nearby if _is_of(path, robot)]
     if len(same) > 1:
         same = [path for path in same if path.stem.lower() == robot.lower()]
     return Path(os.path.normpath(same[0])) if len(same) == 1 else None
@@ -95,7 +100,9 @@ def _is_of(path: Path, robot: str) -> bool:
 
 def _group(group: ElementTree.Element, path: Path) -> Group:
     def all_of(tag: str, *attributes: str) -> list[tuple[str, ...]]:
-        return [tuple(_attribute(one, name, path) for name in attributes) for one in group.findall(tag)]
+        return [
+            tuple(_attribute(element, name, path) for name in attributes) for element in group.findall(tag)
+        ]
 
     chains = [(base, tip) for base, tip in all_of("chain", "base_link", "tip_link")]
     joints, links, groups = (sum(all_of(tag, "name"), ()) for tag in ("joint", "link", "group"))

@@ -91,8 +91,8 @@ def _in_robots_names(srdf: Srdf, robot: Robot) -> Srdf:
     states = {name: with_names(state, new) for name, state in srdf.states.items()}
     named = ("joints", "links", "chains")
     groups = {
-        name: one._replace(**{key: with_names(getattr(one, key), new) for key in named})
-        for name, one in srdf.groups.items()
+        name: group._replace(**{key: with_names(getattr(group, key), new) for key in named})
+        for name, group in srdf.groups.items()
     }
     others = ("disabled", "enabled", "untouched", "passive")
     renamed = {key: with_names(getattr(srdf, key), new) for key in others}
@@ -100,22 +100,22 @@ def _in_robots_names(srdf: Srdf, robot: Robot) -> Srdf:
 
 
 def disabled_pairs(srdf: Srdf, robot: Robot) -> tuple[tuple[str, str], ...]:
-    """The pairs of the robot's links that may touch: those disabled, and of links that may touch all others
-    those that are not enabled."""
+    """The pairs of the robot's links that may touch: the disabled ones, and, of links that may touch all
+    others, the pairs that are not enabled."""
     links = {frame.name for frame in robot.model.frames if frame.type == pin.FrameType.BODY}
     shapes = robot.shapes.collision_model.geometryObjects
     solid = sorted({str(robot.model.frames[shape.parentFrame].name) for shape in shapes})
     enabled = {frozenset(pair) for pair in srdf.enabled}
-    pairs = ((one, other) for one in srdf.untouched for other in solid)
+    pairs = ((link, other) for link in srdf.untouched for other in solid)
     free = (pair for pair in pairs if len({*pair}) == 2 and frozenset(pair) not in enabled)
-    found = dict.fromkeys(pair for pair in (*srdf.disabled, *free) if links.issuperset(pair))
-    return tuple(found)
+    disabled = dict.fromkeys(pair for pair in (*srdf.disabled, *free) if links.issuperset(pair))
+    return tuple(disabled)
 
 
 def _fitted(srdf: Srdf, robot: Robot, *, strict: bool) -> Semantics:
     known = _joints(robot)
     base = _base(srdf, robot)
-    roots = {_ROOT, *(one.name for one in srdf.roots)} - known
+    roots = {_ROOT, *(root.name for root in srdf.roots)} - known
     notes: list[Finding] = []
     postures = NamedPostures()
     for name, state in srdf.states.items():
@@ -136,7 +136,7 @@ def _fitted(srdf: Srdf, robot: Robot, *, strict: bool) -> Semantics:
     if still := [name for name in srdf.groups if name not in groups]:
         notes.append(_note("groups_without_inputs", names=still))
     parts = {*robot.frames, *known, *roots}
-    if strange := [*dict.fromkeys(one for one in _members_named(srdf) if one not in parts)]:
+    if strange := [*dict.fromkeys(name for name in _members_named(srdf) if name not in parts)]:
         notes.append(_note("srdf_names_unknown", names=strange))
     notes += _root_notes(srdf, robot)
     of_file = tuple(replace(note, where={"srdf": srdf.path.name}) for note in notes)
@@ -177,7 +177,7 @@ def _base(srdf: Srdf, robot: Robot) -> set[str]:
         return set()
     replaced = {note.values["name"] for note in robot.notes if note.code == "root_replaced"}
     base = {*provenance_of(robot).base, *replaced}
-    base |= {one.name for one in srdf.roots if one.kind != "fixed" and _is_of_root(one.child, robot)}
+    base |= {root.name for root in srdf.roots if root.kind != "fixed" and _is_of_root(root.child, robot)}
     return {*base, "theta"} if base else base
 
 
@@ -204,14 +204,14 @@ def _coordinates(
             elif abs(numbers[0] - still[joint]) > _SLACK:
                 about = {"posture": name, "name": joint, "locked": still[joint], "wanted": numbers[0]}
                 notes.append(_note("posture_locked", **about))
-    for one in robot.mimic_joints:
-        if one.joint not in values:
+    for mimic in robot.mimic_joints:
+        if mimic.joint not in values:
             continue
-        wanted = values.pop(one.joint)
-        if one.leader not in values and one.multiplier:
-            values[one.leader] = (wanted - one.offset) / one.multiplier
-        elif one.leader in values and abs(one.value(values[one.leader]) - wanted) > _SLACK:
-            about = {"posture": name, "name": one.joint, "leader": one.leader, "mimic": str(one)}
+        wanted = values.pop(mimic.joint)
+        if mimic.leader not in values and mimic.multiplier:
+            values[mimic.leader] = (wanted - mimic.offset) / mimic.multiplier
+        elif mimic.leader in values and abs(mimic.value(values[mimic.leader]) - wanted) > _SLACK:
+            about = {"posture": name, "name": mimic.joint, "leader": mimic.leader, "mimic": str(mimic)}
             notes.append(_note("posture_follows", **about, wanted=wanted))
     return values
 
@@ -248,31 +248,31 @@ def _place(numbers: Sequence[float], robot: Robot) -> dict[str, float]:
 
 def _groups(groups: Mapping[str, Group], robot: Robot, base: set[str]) -> dict[str, tuple[str, ...]]:
     """The inputs of each group that has some: of the platform all for a joint of its base."""
-    found = {}
+    usable = {}
     for name in groups:
         joints = _members(name, groups, robot, ())
         inputs = tuple(
-            one
-            for k, (one, i) in enumerate(zip(robot.u_names, robot.rate_coordinates, strict=True))
+            u_name
+            for k, (u_name, i) in enumerate(zip(robot.u_names, robot.rate_coordinates, strict=True))
             if (i >= 0 and robot.q_names[i] in joints) or (k < robot.platform.p and base & joints)
         )
         if inputs:
-            found[name] = inputs
-    return found
+            usable[name] = inputs
+    return usable
 
 
 def _free_names(groups: Mapping[str, tuple[str, ...]], robot: Robot) -> dict[str, tuple[str, ...]]:
     """The groups under names that are not taken."""
     taken = {*robot.groups, *robot.u_names}
-    found = {}
+    renamed = {}
     for name, inputs in groups.items():
         key, count = name, 0
         while key in taken:
             count += 1
             key = f"{name}_{count}"
         taken.add(key)
-        found[key] = inputs
-    return found
+        renamed[key] = inputs
+    return renamed
 
 
 def _members(name: str, groups: Mapping[str, Group], robot: Robot, above: tuple[str, ...]) -> set[str]:
@@ -288,17 +288,17 @@ def _members(name: str, groups: Mapping[str, Group], robot: Robot, above: tuple[
             for base, tip in group.chains
             if {base, tip} <= {*robot.frames}
         ),
-        *(_members(one, groups, robot, (*above, name)) for one in group.groups),
+        *(_members(member, groups, robot, (*above, name)) for member in group.groups),
     )
 
 
 def _above(robot: Robot, link: str) -> list[str]:
     """The joints from a link to the root, fixed ones too."""
-    found: list[str] = []
+    joints: list[str] = []
     frames = robot.model.frames
     index = robot.frame_id(link) if link in robot.frames else 0
     while index:
         if frames[index].type in _JOINTS:
-            found.append(frames[index].name)
+            joints.append(frames[index].name)
         index = int(frames[index].parentFrame)
-    return found
+    return joints

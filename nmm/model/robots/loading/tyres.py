@@ -40,15 +40,15 @@ def tyres(geometries: Sequence[pin.GeometryModel], joint: int, along: Array) -> 
     frame. Meshes are read only where they are asked for."""
     for geometry in geometries:
         shapes = [shape for shape in geometry.geometryObjects if shape.parentJoint == joint]
-        found = [_of_round(shape, along) for shape in shapes if type(shape.geometry).__name__ in _ROUND]
-        yield from _widest(found)
+        candidates = [_of_round(shape, along) for shape in shapes if type(shape.geometry).__name__ in _ROUND]
+        yield from _widest(candidates)
     for geometry in reversed(geometries):
         shapes = [shape for shape in geometry.geometryObjects if shape.parentJoint == joint]
         yield from _widest([_of_mesh(shape, along) for shape in shapes])
 
 
-def _widest(found: Sequence[Tyre]) -> Iterator[Tyre]:
-    usable = [tyre for tyre in found if math.isfinite(tyre.radius) and tyre.radius > 0.0]
+def _widest(candidates: Sequence[Tyre]) -> Iterator[Tyre]:
+    usable = [tyre for tyre in candidates if math.isfinite(tyre.radius) and tyre.radius > 0.0]
     if usable:
         widest = max(tyre.radius for tyre in usable)
         middles = [tyre.middle for tyre in usable if tyre.radius >= _TREAD * widest]

@@ -59,18 +59,18 @@ def find_virtual_base(model: pin.Model, where: str) -> VirtualBase | None:
     """The joints, if any, by which the root link turns or slides all else on the ground: two or three that
     are endless, or two long slides and a turn, whatever their limits."""
     measured = Measured(model, (), where)
-    found, ways = _chain(measured, _is_endless)
-    turns_first = len(found) == 2 and len(ways) == 1 and measured.is_upright(found[0])
-    place = _place(measured, found)
+    joints, ways = _chain(measured, _is_endless)
+    turns_first = len(joints) == 2 and len(ways) == 1 and measured.is_upright(joints[0])
+    place = _place(measured, joints)
     drives = turns_first and abs(ways[0] @ place.rotation[:, 0]) > 1.0 - _LEVEL
-    if not drives and len(found) + len(ways) < 4:
-        found, ways = _chain(measured, _has_room)
-        if len(found) + len(ways) < 5:
+    if not drives and len(joints) + len(ways) < 4:
+        joints, ways = _chain(measured, _has_room)
+        if len(joints) + len(ways) < 5:
             return None
-        place = _place(measured, found)
-    names = tuple(str(model.names[i]) for i in found)
-    ends = {str(model.names[i]): ends_of(model, i) for i in found if not _is_endless(model, i)}
-    return VirtualBase(names, drives, tuple(speed_limit(model, i) for i in found), ends, place)
+        place = _place(measured, joints)
+    names = tuple(str(model.names[i]) for i in joints)
+    ends = {str(model.names[i]): ends_of(model, i) for i in joints if not _is_endless(model, i)}
+    return VirtualBase(names, drives, tuple(speed_limit(model, i) for i in joints), ends, place)
 
 
 def gantry(model: pin.Model, where: str) -> tuple[str, ...]:
@@ -84,13 +84,13 @@ def gantry(model: pin.Model, where: str) -> tuple[str, ...]:
     return tuple(str(model.names[joint]) for joint in slides) if len(ways) > 1 else ()
 
 
-def _place(measured: Measured, found: list[int]) -> pin.SE3:
-    """Where a base's joints have it at zero: about the one that turns it, with the yaw of what they carry."""
-    if not found:
+def _place(measured: Measured, joints: list[int]) -> pin.SE3:
+    """The base's placement at zero: about the joint that turns it, with the yaw of what the joints carry."""
+    if not joints:
         return pin.SE3.Identity()
-    turning = next((joint for joint in found if measured.is_upright(joint)), found[-1])
+    turning = next((joint for joint in joints if measured.is_upright(joint)), joints[-1])
     x, y, _ = measured.placements[turning].translation
-    forward = measured.placements[found[-1]].rotation[:2, 0]
+    forward = measured.placements[joints[-1]].rotation[:2, 0]
     yaw = float(np.arctan2(forward[1], forward[0])) if np.linalg.norm(forward) > _LEVEL else 0.0
     return pin.SE3(pin.utils.rotate("z", yaw), np.array([x, y, 0.0]))
 
@@ -99,27 +99,27 @@ def _chain(
     measured: Measured, is_usable: Callable[[pin.Model, int], bool], apart: bool = False
 ) -> tuple[list[int], list[Array]]:
     """Up to three joints at one point, or `apart`, that turn or slide all else on the ground, and the slides'
-    ways."""
+    directions."""
     model = measured.model
-    found: list[int] = []
+    joints: list[int] = []
     ways: list[Array] = []
     joint = measured.root
-    while len(found) < 3 and len(model.children[joint]) == 1:
+    while len(joints) < 3 and len(model.children[joint]) == 1:
         (joint,) = map(int, model.children[joint])
         way = _level_slide(measured, joint)
         moved = np.linalg.norm(model.jointPlacements[joint].translation) > NEAR
         # Real joints are apart, those of a base are at one point.
         if (
             not is_usable(model, joint)
-            or (found and moved and not apart)
+            or (joints and moved and not apart)
             or (way is None and not measured.is_upright(joint))
         ):
             break
         if way is not None and any(abs(way @ other) > 1.0 - _LEVEL for other in ways):
             break
-        found.append(joint)
+        joints.append(joint)
         ways += [] if way is None else [way]
-    return found, ways
+    return joints, ways
 
 
 def _is_endless(model: pin.Model, joint: int) -> bool:
@@ -139,8 +139,8 @@ def _moves(model: pin.Model, joint: int) -> bool:
 
 def _level_slide(measured: Measured, joint: int) -> Array | None:
     """The level unit vector (3,) along which a joint slides, if it does."""
-    one = measured.model.joints[joint]
-    if not kind(one).startswith("P"):
+    joint_model = measured.model.joints[joint]
+    if not kind(joint_model).startswith("P"):
         return None
-    way = np.asarray(measured.placements[joint].rotation @ twist(one, measured.neutral)[0])
+    way = np.asarray(measured.placements[joint].rotation @ twist(joint_model, measured.neutral)[0])
     return way if abs(way[2]) < _LEVEL else None

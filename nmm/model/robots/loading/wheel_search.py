@@ -31,7 +31,7 @@ _ON_GROUND, _ALIKE = 0.3, 0.05
 def find_undercarriage(measured: Measured, asked: Asked, own: Collection[str]) -> Undercarriage:
     """What stands still below a base, with joints `own` of its platform, `asked` as in `load`'s `wheels`."""
     expect_names(asked, measured.where)
-    return _Search(measured, asked, frozenset(own)).found()
+    return _Search(measured, asked, frozenset(own)).undercarriage()
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +40,13 @@ class _Search:
     asked: Asked
     own: frozenset[str]
 
-    def found(self) -> Undercarriage:
+    def undercarriage(self) -> Undercarriage:
         model = self.measured.model
         rollers = self._rollers()
         balls = self._balls()
         candidates = [joint for joint in self._candidates(rollers) if joint not in balls]
         direct = [joint for joint in candidates if not self._between(joint)]
-        unnamed = [*self._unnamed(direct), *(one for one in direct if not self._is_meant(one))]
+        unnamed = [*self._unnamed(direct), *(joint for joint in direct if not self._is_meant(joint))]
         ground = self._ground([*direct, *unnamed] or candidates)
         aloft = [j for j in direct if not self._is_near(j, ground, _HANGING)] if self.asked is None else []
         wheels = [j for j in candidates if j not in aloft and (j in direct or self._hangs(j, ground))]
@@ -75,28 +75,30 @@ class _Search:
 
     def _rollers(self) -> dict[int, list[int]]:
         """By wheel: the joints on its rim, each of which only turns."""
-        found: dict[int, list[int]] = {}
+        rollers: dict[int, list[int]] = {}
         model = self.measured.model
         for wheel in range(self.measured.root + 1, model.njoints):
             some = self.measured.children(wheel)
             if len(some) < _ROLLERS or not self._is_level(wheel):
                 continue
             centre, along = self.measured.placements[wheel].translation, self.measured.axis(wheel)
-            away = [np.cross(self.measured.placements[one].translation - centre, along) for one in some]
+            away = [np.cross(self.measured.placements[roller].translation - centre, along) for roller in some]
             sizes = np.linalg.norm(away, axis=1)
-            turn = all(is_revolute(model.joints[one]) and not self.measured.children(one) for one in some)
+            turn = all(
+                is_revolute(model.joints[roller]) and not self.measured.children(roller) for roller in some
+            )
             if turn and sizes.min() > _TOGETHER and np.ptp(sizes) < 0.1 * sizes.max():
-                found[wheel] = some
-        return found
+                rollers[wheel] = some
+        return rollers
 
     def _kind_of(self, wheel: int, rollers: list[int]) -> Rollers:
         along = self.measured.axis(wheel)
-        cosines = [abs(float(self.measured.axis(one) @ along)) for one in rollers]
+        cosines = [abs(float(self.measured.axis(roller) @ along)) for roller in rollers]
         return "mecanum" if math.acos(min(1.0, float(np.median(cosines)))) < _ASLANT else "omni"
 
     def _balls(self) -> list[int]:
         """Joints that roll one about another at one point: a ball, which rolls every way."""
-        model, found = self.measured.model, list[int]()
+        model, balls = self.measured.model, list[int]()
         for joint in range(self.measured.root + 1, model.njoints):
             if self.measured.children(joint):
                 continue
@@ -110,10 +112,10 @@ class _Search:
                 ):
                     break
                 ball.append(parent)
-            meant = any(self._is_meant(one) or "ball" in str(model.names[one]).lower() for one in ball)
+            meant = any(self._is_meant(joint) or "ball" in str(model.names[joint]).lower() for joint in ball)
             if meant and sum(map(self._is_level, ball)) > 1:
-                found += ball
-        return found
+                balls += ball
+        return balls
 
     def _candidates(self, rollers: dict[int, list[int]]) -> list[int]:
         some = {roller for joints in rollers.values() for roller in joints}
@@ -126,15 +128,13 @@ class _Search:
         ]
 
     def _between(self, joint: int) -> list[int]:
-        """What is between a wheel and the base that is neither its pivot nor a hitch nor the platform's."""
+        """The joints between a wheel and the base but its pivot, hitches and the platform's own."""
         model, above = self.measured.model, self.measured.above(joint)
-        upright = [one for one in above if self.measured.is_upright(one)]
-        pivots = {one for one in upright if is_named(str(model.names[one]), HITCHES)}
-        if upright and not any(
-            is_revolute(model.joints[one]) for one in above[above.index(upright[-1]) + 1 :]
-        ):
+        upright = [j for j in above if self.measured.is_upright(j)]
+        pivots = {j for j in upright if is_named(str(model.names[j]), HITCHES)}
+        if upright and not any(is_revolute(model.joints[j]) for j in above[above.index(upright[-1]) + 1 :]):
             pivots.add(upright[-1])  # below it springs at most
-        return [one for one in above if one not in pivots and str(model.names[one]) not in self.own]
+        return [j for j in above if j not in pivots and str(model.names[j]) not in self.own]
 
     def _lowest(self, joint: int) -> float:
         return float(self.measured.placements[joint].translation[2]) - self._radius(joint)
@@ -157,12 +157,12 @@ class _Search:
         return self.asked is not None or abs(self._lowest(joint) - ground) <= _SPRUNG * self._radius(joint)
 
     def _suspension(self, wheels: list[int], parts: Collection[int]) -> set[int]:
-        """What carries nothing that moves but wheels."""
+        """The joints that carry nothing that moves but wheels."""
         held: set[int] = set()
         for wheel in wheels:
             between = self._between(wheel)
-            pivots = {one for one in self.measured.above(wheel) if one not in between}
-            if all(self._carries_only(one, {*parts, *between, *pivots, *held}) for one in between):
+            pivots = {joint for joint in self.measured.above(wheel) if joint not in between}
+            if all(self._carries_only(joint, {*parts, *between, *pivots, *held}) for joint in between):
                 held |= set(between)
         return held
 
@@ -187,17 +187,21 @@ class _Search:
         return True
 
     def _leads_to(self, joint: int, parts: Collection[int]) -> bool:
-        """Whether some wheel is below."""
-        return any(one in parts or self._leads_to(one, parts) for one in self.measured.children(joint))
+        """Whether one of `parts` is below a joint."""
+        return any(child in parts or self._leads_to(child, parts) for child in self.measured.children(joint))
 
     def _unnamed(self, direct: list[int]) -> list[int]:
         """Joints on the base whose bodies are round about them and on one ground, with what is named so."""
         if self.asked is not None:
             return []
         model, root = self.measured.model, self.measured.root
-        found = []
-        columns = [one for one in self.measured.children(root) if self.measured.is_upright(one)]
-        below = [self.measured.children(one)[0] for one in columns if len(self.measured.children(one)) == 1]
+        unnamed = []
+        columns = [joint for joint in self.measured.children(root) if self.measured.is_upright(joint)]
+        below = [
+            self.measured.children(column)[0]
+            for column in columns
+            if len(self.measured.children(column)) == 1
+        ]
         for joint in (*self.measured.children(root), *below):
             if (
                 joint in direct
@@ -206,14 +210,14 @@ class _Search:
             ):
                 continue
             if str(model.names[joint]) not in self.own and self._is_round(joint):
-                found.append(joint)
-        if not found or len(found) + len(direct) < 2:
+                unnamed.append(joint)
+        if not unnamed or len(unnamed) + len(direct) < 2:
             return []
-        ground = self._ground(direct) if direct else min(self._lowest(joint) for joint in found)
-        radius = max(self._radius(joint) for joint in (direct or found))
+        ground = self._ground(direct) if direct else min(self._lowest(joint) for joint in unnamed)
+        radius = max(self._radius(joint) for joint in (direct or unnamed))
         return [
             joint
-            for joint in found
+            for joint in unnamed
             if abs(self._lowest(joint) - ground) <= _ON_GROUND * radius
             and (direct or abs(self._radius(joint) - radius) <= _ALIKE * radius)
         ]
