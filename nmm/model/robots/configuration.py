@@ -72,9 +72,9 @@ class Configuration:
 
     def _elsewhere(self, q: Array) -> Configuration:
         """The robot at q (n,), without checks: no user gave it."""
-        found = object.__new__(Configuration)
-        found._compute(self.robot, q, self._spare)
-        return found
+        configuration = object.__new__(Configuration)
+        configuration._compute(self.robot, q, self._spare)
+        return configuration
 
     def __del__(self) -> None:
         # Its data of Pinocchio are free for another: making them anew is three quarters of

@@ -119,14 +119,14 @@ class Coordinates:
         """Whether a full turn of each independent coordinate leads to the same posture, (n,): θ, joints that
         the file calls continuous, others without limits. A joint that would not come round with it makes its
         leader none."""
-        found = self.endless.copy()
-        for one, f, leader in zip(
+        flags = self.endless.copy()
+        for mimic, f, leader in zip(
             self.mimic_joints, self.following.columns, self.following.leaders, strict=True
         ):
-            comes_round = not one.multiplier or (self.endless[f] and float(one.multiplier).is_integer())
-            found[leader] &= comes_round
-        found[self.following.columns] = False
-        return unwritable(found)
+            comes_round = not mimic.multiplier or (self.endless[f] and float(mimic.multiplier).is_integer())
+            flags[leader] &= comes_round
+        flags[self.following.columns] = False
+        return unwritable(flags)
 
     def turns(self, limits: Array | None = None) -> Array:
         """What a full turn of each coordinate, or of the one that it follows, turns it by, (n,): 1 of
@@ -135,10 +135,10 @@ class Coordinates:
         free = self.continuous.copy()
         if limits is not None:
             free[self.platform.n_p :] &= ~np.isfinite(limits[self.platform.n_p :]).any(axis=1)
-        found = free.astype(np.float64)
+        turns = free.astype(np.float64)
         following = self.following
-        found[following.columns] = following.multipliers * found[following.leaders]
-        return found
+        turns[following.columns] = following.multipliers * turns[following.leaders]
+        return turns
 
     def short_way(self, off: Array) -> Array:
         """Differences of configurations (..., n) by the short way round: of continuous ones in [-π, π]."""
@@ -148,9 +148,9 @@ class Coordinates:
     @cached_property
     def own_or_leader(self) -> Integers:
         """Each coordinate's own index or, of a mimic joint, its leader's, (n,)."""
-        found = np.arange(self.n)
-        found[self.following.columns] = self.following.leaders
-        return unwritable(found)
+        indices = np.arange(self.n)
+        indices[self.following.columns] = self.following.leaders
+        return unwritable(indices)
 
     @cached_property
     def u_limits(self) -> Array:
@@ -197,9 +197,9 @@ class Coordinates:
     def independent(self, name: str) -> int:
         """Index of a coordinate that follows no other; `InputError` names the one that it follows."""
         index = self.coordinate(name)
-        for one in self.mimic_joints:
-            if one.joint == name:
-                what = f"{name} follows {one.leader} ({one}): give {one.leader}"
+        for mimic in self.mimic_joints:
+            if mimic.joint == name:
+                what = f"{name} follows {mimic.leader} ({mimic}): give {mimic.leader}"
                 raise InputError(what, where=f"robot {self.name}", got=name)
         return index
 
@@ -226,12 +226,12 @@ class Coordinates:
         if values is None or isinstance(values, Mapping):
             if values and POSTURE in values and POSTURE not in self.q_names:
                 values = self.postures.within(values)
-            given = {
+            entries = {
                 self.coordinate(name): scalar(value, name)
                 for name, value in (values or {}).items()
                 if name in self.q_names or abs(self.locked.get(name, np.inf) - scalar(value, name)) > SLACK
             }
-            columns, numbers = [*given], [*given.values()]
+            columns, numbers = [*entries], [*entries.values()]
             q = np.zeros(self.n)
             q[columns] = numbers
             q = self.following.placed(q)
@@ -252,7 +252,7 @@ class Coordinates:
         """The coordinates of q (n,) outside limits (n, 2), by default the robot's: by name, in words."""
         q = self.q(q)
         limits = self.q_limits if limits is None else limits
-        following = {one.joint for one in self.mimic_joints}  # their leaders' limits are theirs, too
+        following = {mimic.joint for mimic in self.mimic_joints}  # their leaders' limits are theirs, too
         return {
             name: "{0} = {2} {1} (from {3} to {4})".format(name, unit, *apart(value, lower, upper, digits=6))
             for name, value, unit, (lower, upper) in zip(self.q_names, q, self.q_units, limits, strict=True)
@@ -282,8 +282,8 @@ class Coordinates:
         """The mimic joints that are not where their leader puts them, by name, in words."""
         placed = self.following.placed(q)
         return {
-            one.joint: f"{one.joint} is at {q[i]:g} {self.q_units[i]}; it follows {one.leader}, which has it "
-            f"at {placed[i]:g} ({one})"
-            for one, i in zip(self.mimic_joints, self.following.columns, strict=True)
+            mimic.joint: f"{mimic.joint} is at {q[i]:g} {self.q_units[i]}; it follows {mimic.leader}, which "
+            f"has it at {placed[i]:g} ({mimic})"
+            for mimic, i in zip(self.mimic_joints, self.following.columns, strict=True)
             if not abs(q[i] - placed[i]) <= SLACK * max(1.0, abs(placed[i]))
         }

@@ -16,12 +16,12 @@ def by_name(
     weights: Mapping[str, float], inputs: Sequence[str], groups: Mapping[str, Sequence[str]]
 ) -> Array:
     """A weight for each input, (m,); `InputError` for an unknown name. The caller checks the signs."""
-    found = np.ones(len(inputs))
+    values = np.ones(len(inputs))
     for name in weights:
         expect_known("input or group", name, [*inputs, *groups], "weights")
     # An input's own weight has the last word, a smaller group's the one before.
     order = sorted(weights, key=lambda name: name in inputs or -len(groups[name]))
     for name in order:
         for member in (name,) if name in inputs else groups[name]:
-            found[inputs.index(member)] = scalar(weights[name], f"weight of {name}")
-    return found
+            values[inputs.index(member)] = scalar(weights[name], f"weight of {name}")
+    return values

@@ -31,14 +31,14 @@ def joint_table(model: pin.Model, turned: Sequence[pin.SE3]) -> Joints:
 
 def own_axes(model: pin.Model) -> list[pin.SE3]:
     """For each joint its axes as `joint_table` turns them, in its axes as Pinocchio has them."""
-    found = [pin.SE3.Identity()]
+    axes = [pin.SE3.Identity()]
     for i in range(1, len(model.joints)):
         _, angular = twist(model.joints[i], pin.neutral(model))
         rotation = np.eye(3)
         if angular.any():
             rotation = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), angular).toRotationMatrix()
-        found.append(pin.SE3(rotation, np.zeros(3)))
-    return found
+        axes.append(pin.SE3(rotation, np.zeros(3)))
+    return axes
 
 
 def frame_table(model: pin.Model, turned: Sequence[pin.SE3], frames: Sequence[int | None]) -> FrameTable:
@@ -71,12 +71,12 @@ def placement_rows(placements: pin.StdVec_SE3) -> Array:
     if not len(placements):
         return np.zeros((0, 12))
     first, last = placements[0], placements[len(placements) - 1]
-    start, end = (_address(one.rotation) for one in (first, last))
+    start, end = (_address(placement.rotation) for placement in (first, last))
     stride = (end - start) // (len(placements) - 1) if len(placements) > 1 else 96
     rows = np.lib.stride_tricks.as_strided(first.rotation, (len(placements), 12), (stride, 8))
-    for one, row in ((first, rows[0]), (last, rows[-1])):
-        places = _address(one.rotation), _address(one.translation)
-        if places != (_address(row), _address(row[9:])) or not one.rotation.flags.f_contiguous:
+    for placement, row in ((first, rows[0]), (last, rows[-1])):
+        places = _address(placement.rotation), _address(placement.translation)
+        if places != (_address(row), _address(row[9:])) or not placement.rotation.flags.f_contiguous:
             raise NmmError("this version of Pinocchio keeps placements in another way than nmm expects")
     return rows
 

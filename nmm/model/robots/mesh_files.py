@@ -44,8 +44,8 @@ def mesh_arrays(file: str, scale: Sequence[float] | Array = (1.0, 1.0, 1.0)) -> 
     else:
         parts = [(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))]
     before = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
-    vertices = np.vstack([np.asarray(one, dtype=float) for one, _ in parts]) * scale
-    faces = np.vstack([one + start for (_, one), start in zip(parts, before, strict=False)])
+    vertices = np.vstack([np.asarray(block, dtype=float) for block, _ in parts]) * scale
+    faces = np.vstack([block + start for (_, block), start in zip(parts, before, strict=False)])
     if not np.all(np.abs(vertices) <= FARTHEST):
         raise ValueError(f"a corner is no point within {FARTHEST:g} m")
     return vertices, np.asarray(faces, dtype=np.int64)

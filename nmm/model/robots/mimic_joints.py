@@ -62,23 +62,23 @@ def settled(
     move, each after its leader."""
     values = dict(standing)
     still: dict[str, tuple[str, float]] = {}
-    for one in mimic_joints:
-        if one.leader in values:
-            values[one.joint] = one.value(values[one.leader])
-            still[one.joint] = one.leader, values[one.joint]
-    return still, tuple(one for one in mimic_joints if one.joint not in still)
+    for mimic in mimic_joints:
+        if mimic.leader in values:
+            values[mimic.joint] = mimic.value(values[mimic.leader])
+            still[mimic.joint] = mimic.leader, values[mimic.joint]
+    return still, tuple(mimic for mimic in mimic_joints if mimic.joint not in still)
 
 
 def first_leaders(mimic_joints: Iterable[MimicJoint]) -> tuple[MimicJoint, ...]:
     """The mimic joints, each after its leader, made to follow independent joints."""
-    found: dict[str, MimicJoint] = {}
-    for one in mimic_joints:
-        ahead = found.get(one.leader)
+    resolved: dict[str, MimicJoint] = {}
+    for mimic in mimic_joints:
+        ahead = resolved.get(mimic.leader)
         if ahead is not None:
-            factor, offset = one.multiplier * ahead.multiplier, one.value(ahead.offset)
-            one = MimicJoint(one.joint, ahead.leader, factor, offset)
-        found[one.joint] = one
-    return tuple(found.values())
+            factor, offset = mimic.multiplier * ahead.multiplier, mimic.value(ahead.offset)
+            mimic = MimicJoint(mimic.joint, ahead.leader, factor, offset)
+        resolved[mimic.joint] = mimic
+    return tuple(resolved.values())
 
 
 class MimicJoints:
@@ -91,18 +91,18 @@ class MimicJoints:
     `InputError` for an unknown coordinate, and for a joint with two leaders or a mimic joint as leader."""
 
     def __init__(self, mimic_joints: Sequence[MimicJoint], names: Sequence[str]) -> None:
-        joints = [one.joint for one in mimic_joints]
-        for one in mimic_joints:
-            where = f"followers: {one}"
-            for name in (one.joint, one.leader):
+        joints = [mimic.joint for mimic in mimic_joints]
+        for mimic in mimic_joints:
+            where = f"followers: {mimic}"
+            for name in (mimic.joint, mimic.leader):
                 expect_known("coordinate", name, names, where)
-            independent = one.leader not in joints and joints.count(one.joint) == 1
+            independent = mimic.leader not in joints and joints.count(mimic.joint) == 1
             expect(independent, where, "one leader, which follows no other joint")
         self.mimic_joints = tuple(mimic_joints)
         self.columns = np.array([names.index(name) for name in joints], dtype=np.int64)
-        self.leaders = np.array([names.index(one.leader) for one in mimic_joints], dtype=np.int64)
-        self.multipliers = np.array([one.multiplier for one in mimic_joints], dtype=np.float64)
-        self.offsets = np.array([one.offset for one in mimic_joints], dtype=np.float64)
+        self.leaders = np.array([names.index(mimic.leader) for mimic in mimic_joints], dtype=np.int64)
+        self.multipliers = np.array([mimic.multiplier for mimic in mimic_joints], dtype=np.float64)
+        self.offsets = np.array([mimic.offset for mimic in mimic_joints], dtype=np.float64)
         self.independent = np.setdiff1d(np.arange(len(names)), self.columns)
 
     @property
@@ -119,32 +119,34 @@ class MimicJoints:
 
     def placed(self, q: Array) -> Array:
         """A copy of q (..., n) with the mimic joints where their leaders put them."""
-        found = np.array(q, dtype=np.float64)
-        found[..., self.columns] = self.multipliers * found[..., self.leaders] + self.offsets
-        return found
+        placed = np.array(q, dtype=np.float64)
+        placed[..., self.columns] = self.multipliers * placed[..., self.leaders] + self.offsets
+        return placed
 
     def narrowed(self, limits: Array) -> tuple[Array, tuple[MimicJoint, ...]]:
         """Limits (n, 2), rad or m, narrowed to keep mimic joints within their own; and mimic joints ignored
         because they would leave their leader no room: files give them limits of the wrong sign."""
-        found, contrary = limits.copy(), []
-        for one, f, leader in zip(self.mimic_joints, self.columns, self.leaders, strict=True):
-            own = limits[f] - one.offset
-            allowed = np.sort(own / one.multiplier) if one.multiplier else np.array([-np.inf, np.inf])
-            room = max(allowed[0], found[leader, 0]), min(allowed[1], found[leader, 1])
-            had_room = found[leader, 1] - found[leader, 0] > SLACK
-            fits = own[0] <= SLACK and own[1] >= -SLACK if not one.multiplier else room[1] - room[0] > SLACK
+        bounds, contrary = limits.copy(), []
+        for mimic, f, leader in zip(self.mimic_joints, self.columns, self.leaders, strict=True):
+            own = limits[f] - mimic.offset
+            allowed = np.sort(own / mimic.multiplier) if mimic.multiplier else np.array([-np.inf, np.inf])
+            room = max(allowed[0], bounds[leader, 0]), min(allowed[1], bounds[leader, 1])
+            had_room = bounds[leader, 1] - bounds[leader, 0] > SLACK
+            fits = own[0] <= SLACK and own[1] >= -SLACK if not mimic.multiplier else room[1] - room[0] > SLACK
             if fits:
-                found[leader] = room
+                bounds[leader] = room
             elif had_room or room[1] - room[0] < -SLACK:
-                contrary.append(one)
-        for one, f, leader in zip(self.mimic_joints, self.columns, self.leaders, strict=True):
-            found[f] = np.sort([one.value(end) for end in found[leader]]) if one.multiplier else one.offset
-        return found, tuple(contrary)
+                contrary.append(mimic)
+        for mimic, f, leader in zip(self.mimic_joints, self.columns, self.leaders, strict=True):
+            bounds[f] = (
+                np.sort([mimic.value(end) for end in bounds[leader]]) if mimic.multiplier else mimic.offset
+            )
+        return bounds, tuple(contrary)
 
     def slowed(self, speeds: Array) -> Array:
         """Largest speeds (n,), rad/s or m/s, that keep mimic joints within theirs."""
-        found = speeds.copy()
+        bounds = speeds.copy()
         for f, leader, m in zip(self.columns, self.leaders, np.abs(self.multipliers), strict=True):
             if m:
-                found[leader] = min(found[leader], speeds[f] / m)
-        return found
+                bounds[leader] = min(bounds[leader], speeds[f] / m)
+        return bounds

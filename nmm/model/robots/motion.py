@@ -81,14 +81,14 @@ class Camera:
     def picture(self, robot: Robot, q: Array) -> Array:
         """Where it sees the points (N, k, 2), normalised, from q (N, n); not a number behind it."""
         data, frame = robot.model.createData(), robot.frame_id(self.frame)
-        found = np.full((len(q), self.points.shape[1], 2), np.nan)
-        for k, (here, points) in enumerate(zip(q, self.points, strict=True)):
-            pin.framesForwardKinematics(robot.model, data, here)
+        image = np.full((len(q), self.points.shape[1], 2), np.nan)
+        for k, (q_k, points) in enumerate(zip(q, self.points, strict=True)):
+            pin.framesForwardKinematics(robot.model, data, q_k)
             placement = data.oMf[frame]
             seen = (points - placement.translation) @ placement.rotation
             ahead = seen[:, 2] > 0.0
-            found[k, ahead] = seen[ahead, :2] / seen[ahead, 2:]
-        return found
+            image[k, ahead] = seen[ahead, :2] / seen[ahead, 2:]
+        return image
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,10 +166,10 @@ class Motion:
             expected = f"placements of shape ({t.size}, 4, 4) or (1, 4, 4)"
             shape = body.places.shape
             expect(shape in ((t.size, 4, 4), (1, 4, 4)), f"bodies: {body.name}", expected, shape)
-        for one in self.surroundings.carried:
-            with_place = f"surroundings: {one.name}: place"
-            self.robot.frame_id(one.frame)
-            expect(one.place.shape == (4, 4), with_place, "a matrix of shape (4, 4)", one.place.shape)
+        for carried in self.surroundings.carried:
+            with_place = f"surroundings: {carried.name}: place"
+            self.robot.frame_id(carried.frame)
+            expect(carried.place.shape == (4, 4), with_place, "a matrix of shape (4, 4)", carried.place.shape)
         for thing in self.surroundings.scenery:
             shape = thing.places.shape
             expect(shape == (1, 4, 4), f"surroundings: {thing.name}", "a placement of shape (1, 4, 4)", shape)

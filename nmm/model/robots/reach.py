@@ -29,17 +29,17 @@ def reach(robot: Robot, frame: str) -> Reach | None:
     """The reach of the arm that carries a frame, if any: from the arm's first joint on, the distances from
     joint to joint and to the frame's origin, and the travel of sliding joints (infinite without a limit). An
     upper bound, for the joints stand at angles to each other."""
-    there = robot.model.frames[robot.frame_id(frame)]
-    joints = _arm_joints(robot, there.parentJoint)
+    end = robot.model.frames[robot.frame_id(frame)]
+    joints = _arm_joints(robot, end.parentJoint)
     if not joints:
         return None
-    length = robot.joint_reaches[there.parentJoint] + np.linalg.norm(there.placement.translation)
+    length = robot.joint_reaches[end.parentJoint] + np.linalg.norm(end.placement.translation)
     return Reach(str(robot.model.names[joints[0]]), float(length))
 
 
 def _arm_joints(robot: Robot, joint: int) -> list[int]:
     joints, n_p = robot.model.joints, robot.platform.n_p
-    return [one for one in robot.model.supports[joint] if one > 0 and joints[one].idx_q >= n_p]
+    return [i for i in robot.model.supports[joint] if i > 0 and joints[i].idx_q >= n_p]
 
 
 def joint_position(robot: Robot, q: Array, joint: str) -> Array:
@@ -66,12 +66,12 @@ def arm_end(robot: Robot, joint: int) -> str | None:
     """The frame at the end of a joint's body: the one whose name says so, or the farthest out."""
     kinds = (pin.FrameType.BODY, pin.FrameType.OP_FRAME)
     above = {frame.parentFrame for frame in robot.model.frames}
-    there = [
+    candidates = [
         (i in above, _rank(frame.name), -float(np.linalg.norm(frame.placement.translation)), frame.name)
         for i, frame in enumerate(robot.model.frames)
         if frame.parentJoint == joint and frame.type in kinds
     ]
-    return min(there)[-1] if there else None
+    return min(candidates)[-1] if candidates else None
 
 
 def arm_branches(robot: Robot) -> tuple[tuple[int, ...], ...]:

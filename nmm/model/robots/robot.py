@@ -90,10 +90,10 @@ class Robot(Coordinates):
         expected = f"{', '.join(self.platform.coordinates)} as the first coordinates"
         where = f"{self.name}: platform {self.platform.name}"
         expect(head == self.platform.coordinates, where, expected, head)
-        for one in self.mimic_joints:
-            if one.joint in head:
-                what = f"the {self.platform.name} platform moves {one.joint}"
-                raise InputError(what, where=f"{self.name}: {one}", got=one.joint)
+        for mimic in self.mimic_joints:
+            if mimic.joint in head:
+                what = f"the {self.platform.name} platform moves {mimic.joint}"
+                raise InputError(what, where=f"{self.name}: {mimic}", got=mimic.joint)
         try:
             self.following  # noqa: B018  # whether there are such coordinates is seen when it is made
         except InputError as error:
@@ -144,17 +144,17 @@ class Robot(Coordinates):
     @cached_property
     def reversed_joints(self) -> tuple[str, ...]:
         """The platform's joints whose axes point down in the file: their coordinates' sign is the other."""
-        found = (note.values["names"] for note in self.notes if note.code == "joints_reversed")
-        return tuple(name for names in found for name in names)
+        reversals = (note.values["names"] for note in self.notes if note.code == "joints_reversed")
+        return tuple(name for names in reversals for name in names)
 
     def frame_id(self, name: str) -> int:
         """Pinocchio's index of a frame; of the link's where a link and a joint share the name."""
-        found = self._frame_ids.get(name)
-        if found is None:
+        index = self._frame_ids.get(name)
+        if index is None:
             if name == "universe" or not self.model.existFrame(name):
                 raise no_such("frame", name, self.frames, f"robot {self.name}")
-            found = self._frame_ids[name] = frame_index(self.model, name)
-        return found
+            index = self._frame_ids[name] = frame_index(self.model, name)
+        return index
 
     @cached_property
     def _frame_ids(self) -> dict[str, int]:
@@ -210,8 +210,8 @@ class Robot(Coordinates):
         >>> robot.q_from({"q2": 0.5, "q1": 0.1}, base=(1, 2, 0.3), near=[0, 0, 6, 0, 0]).round(3)
         array([1.   , 2.   , 6.583, 0.1  , 0.5  ])
         """
-        found: Array = self._encoders.q(joints, base, near)
-        return found
+        q: Array = self._encoders.q(joints, base, near)
+        return q
 
     @cached_property
     def _encoders(self) -> Any:
@@ -252,8 +252,8 @@ class Robot(Coordinates):
         >>> nmm.load("differential_base", platform="unicycle").wheel_speeds([0.5, 0.0])
         {'left_wheel_joint': 5.0, 'right_wheel_joint': 5.0}
         """
-        found: dict[str, float] = lazy_call("nmm.plugins.robot.odometry:wheel_speeds")(self, u, q)
-        return found
+        by_joint: dict[str, float] = lazy_call("nmm.plugins.robot.odometry:wheel_speeds")(self, u, q)
+        return by_joint
 
     def platform_inputs(self, speeds: Mapping[str, float], q: ArrayLike | None = None) -> Array:
         """The platform's inputs (p,) for speeds of wheels, rad/s by joint, the nearest where they contradict
@@ -269,8 +269,8 @@ class Robot(Coordinates):
         >>> robot.platform_inputs({"left_wheel_joint": 4.0, "right_wheel_joint": 6.0}).round(3)
         array([0.5, 0.5])
         """
-        found: Array = lazy_call("nmm.plugins.robot.odometry:platform_inputs")(self, speeds, q)
-        return found
+        u: Array = lazy_call("nmm.plugins.robot.odometry:platform_inputs")(self, speeds, q)
+        return u
 
     def _repr_html_(self) -> str:
         """In a notebook: the page that shows it, with a slider for each coordinate."""

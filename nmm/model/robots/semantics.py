@@ -26,18 +26,18 @@ class NamedPostures(dict[str, Mapping[str, float]]):
     """
 
     def __missing__(self, name: object) -> Mapping[str, float]:
-        there = self or {"none, for no SRDF was found beside the robot's file that holds one": None}
-        raise no_such(POSTURE, name, there)
+        available = self or {"none, for no SRDF was found beside the robot's file that holds one": None}
+        raise no_such(POSTURE, name, available)
 
     def within(self, values: Named) -> dict[str, float]:
         """Coordinates by name; the key `posture` stands for those of one or several postures. Later postures
         override earlier ones, and the coordinates beside them override all."""
-        given = dict(values)
-        named = given.pop(POSTURE)
-        found: dict[str, float] = {}
+        coordinates = dict(values)
+        named = coordinates.pop(POSTURE)
+        merged: dict[str, float] = {}
         for name in (named,) if isinstance(named, str) or not isinstance(named, Sequence) else named:
-            found |= self[name] if isinstance(name, str) else self.__missing__(name)
-        return {**found, **given}  # type: ignore[dict-item]  # the caller asks whether they are numbers
+            merged |= self[name] if isinstance(name, str) else self.__missing__(name)
+        return {**merged, **coordinates}  # type: ignore[dict-item]  # the caller asks whether they are numbers
 
 
 @dataclass(frozen=True)
@@ -77,10 +77,10 @@ class Semantics:
                 postures[prefix + name] = {**postures.get(prefix + name, {}), **own}
         groups = dict(self.groups)
         for name, inputs in arm.groups.items():
-            members = tuple(prefix + one for one in inputs if prefix + one in arms_own)
+            members = tuple(prefix + joint for joint in inputs if prefix + joint in arms_own)
             if members:
                 groups.setdefault(prefix + name, members)
-        disabled = tuple((prefix + one, prefix + other) for one, other in arm.disabled)
+        disabled = tuple((prefix + first, prefix + second) for first, second in arm.disabled)
         start = {prefix + name: value for name, value in arm.start.items() if prefix + name in arms_own}
         whole = (
             self.disabled + disabled,

@@ -88,14 +88,14 @@ class Surroundings:
     def payload(self) -> dict[str, tuple[float, list[float]]]:
         """Masses by frame, kg, and where they are in its axes, m, as `nmm.Dynamics` takes them; what a frame
         carries is taken together in its centre of mass."""
-        found: dict[str, tuple[float, list[float]]] = {}
-        for one in self.carried:
-            if one.mass > 0.0:
-                before, place = found.get(one.frame, (0.0, [0.0, 0.0, 0.0]))
-                mass = before + one.mass
-                middle = (before * np.array(place) + one.mass * one.place[:3, 3]) / mass
-                found[one.frame] = mass, middle.tolist()
-        return found
+        loads: dict[str, tuple[float, list[float]]] = {}
+        for body in self.carried:
+            if body.mass > 0.0:
+                before, place = loads.get(body.frame, (0.0, [0.0, 0.0, 0.0]))
+                mass = before + body.mass
+                middle = (before * np.array(place) + body.mass * body.place[:3, 3]) / mass
+                loads[body.frame] = mass, middle.tolist()
+        return loads
 
 
 #: Nothing beside the robot.

@@ -74,8 +74,8 @@ def wheel_shares(rows: Array, q: Array) -> Array:
     """What the coordinates' rates add to the wheels', (N, w, n), at q (N, n): see `rolling`."""
     shares = np.zeros((len(q), len(rows), q.shape[1]))
     for k, wheel in enumerate(rows):
-        found = rolling(wheel, q[:, 2], steered_by(wheel, q))
-        for i, share in zip(moved_by(wheel), found, strict=False):
+        terms = rolling(wheel, q[:, 2], steered_by(wheel, q))
+        for i, share in zip(moved_by(wheel), terms, strict=False):
             shares[:, k, i] = share
     return shares
 
@@ -114,12 +114,12 @@ def turning_wheels(robot: Robot, q: Array, q_dot: Array) -> tuple[tuple[str, ...
 def steered_wheels(robot: Robot) -> dict[str, tuple[str, Callable[[float], float]]]:
     """Swivels that follow a car's steering angle δ: by joint, this, and δ at the swivel's angle."""
     rows = dict(zip(*wheel_rates(robot), strict=True))
-    found: dict[str, tuple[str, Callable[[float], float]]] = {}
+    swivels: dict[str, tuple[str, Callable[[float], float]]] = {}
     for wheel in robot.wheels:
         if wheel.swivel and wheel.joint in rows:
             row = rows[wheel.joint]
-            found[wheel.swivel] = robot.q_names[int(row[4])], partial(_steering, robot, wheel, row)
-    return found
+            swivels[wheel.swivel] = robot.q_names[int(row[4])], partial(_steering, robot, wheel, row)
+    return swivels
 
 
 def _steering(robot: Robot, wheel: Wheel, row: Array, angle: float) -> float:
