@@ -46,12 +46,12 @@ def finite(value: Any) -> Any:
 def infinite(value: ArrayLike, name: str, expected: str) -> Array:
     """A float64 array of at most one axis as one of one axis; infinite numbers may be among them."""
     try:
-        found = np.atleast_1d(np.array(value, dtype=np.float64))
+        result = np.atleast_1d(np.array(value, dtype=np.float64))
     except (TypeError, ValueError):
-        found = np.array([np.nan])
-    if found.ndim != 1 or np.any(np.isnan(found)):
+        result = np.array([np.nan])
+    if result.ndim != 1 or np.any(np.isnan(result)):
         raise InputError(where=name, expected=expected, got=value)
-    return found
+    return result
 
 
 def vector(value: ArrayLike, length: int | tuple[int, ...] | None, name: str) -> Array:
@@ -91,8 +91,8 @@ def scalar(
     if above < value < below and least <= value <= most:
         return float(value)
     bounds = {"above": above, "from": least, "below": below, "to": most}
-    said = [f"{word} {bound:g}" for word, bound in bounds.items() if math.isfinite(bound)]
-    joined = (" " if "to" in said[-1] else " and ").join(said)
+    texts = [f"{word} {bound:g}" for word, bound in bounds.items() if math.isfinite(bound)]
+    joined = (" " if "to" in texts[-1] else " and ").join(texts)
     raise InputError(where=name, expected=f"a number {joined}", got=float(value))
 
 

@@ -57,9 +57,9 @@ def over_cores(
         take(tell)
         tell(count)
     finally:
-        for one in helping:
-            if not one.cancel():
-                one.result()
+        for future in helping:
+            if not future.cancel():
+                future.result()
 
 
 @cache

@@ -105,13 +105,13 @@ class NmmError(Exception):
         return cast("E", made(where=where, **fields | others))
 
     def _text(self) -> str:
-        said = self.what
+        text = self.what
         if self.expected:
             came = "" if self.got is NOTHING else f", got {self.show(self.got)}"
             mend = "" if self.mend is None else f", as in {self.mend}"
-            said += f"{'; ' if said else ''}expected {self.expected}{mend}{came}"
-        where = _without_middle(self.where, max(LONGEST, MOST - len(said) - LONGEST // 2))
-        head = ": ".join(part for part in (where, said) if part)
+            text += f"{'; ' if text else ''}expected {self.expected}{mend}{came}"
+        where = _without_middle(self.where, max(LONGEST, MOST - len(text) - LONGEST // 2))
+        head = ": ".join(part for part in (where, text) if part)
         head = one_line(printable(one_line(head, MOST)), MOST)
         if self.available is None:
             return head
@@ -256,7 +256,7 @@ def shown(value: object) -> str:
     if isinstance(value, float):
         return f"{value:g}"
     if isinstance(value, list | tuple) and 0 < len(value) < FIRST:
-        inner = ", ".join(shown(one) for one in value)
+        inner = ", ".join(shown(item) for item in value)
         return f"[{inner}]" if isinstance(value, list) else f"({inner})"
     if hasattr(value, "__array_interface__"):  # NumPy's: importing it here every start would pay
         return _shown_array(value)
@@ -269,7 +269,7 @@ def shown(value: object) -> str:
 def _shown_array(value: Any) -> str:
     if value.ndim == 0:
         return shown(value.item())
-    values = ", ".join(shown(one) for one in value.ravel()[:FIRST].tolist())
+    values = ", ".join(shown(item) for item in value.ravel()[:FIRST].tolist())
     if value.ndim == 1 and value.size <= FIRST:
         return f"[{values}]"
     return f"shape {value.shape}{': ' if values else ''}{values}{', …' if value.size > FIRST else ''}"
@@ -320,9 +320,9 @@ def no_such(
     """
     import difflib  # here: every start would pay
 
-    asked, names = str(name), [str(one) for one in available]
-    short = [one for one in names if len(one) < LONGEST]
-    near = [one for one in short if one.lower() == asked.lower()]
+    asked, names = str(name), [str(candidate) for candidate in available]
+    short = [candidate for candidate in names if len(candidate) < LONGEST]
+    near = [candidate for candidate in short if candidate.lower() == asked.lower()]
     if not near and len(asked) < LONGEST:
         near = difflib.get_close_matches(asked, short, n=1)
     hint = hint or (f" (did you mean {quoted(near[0])}?)" if near else "")
@@ -357,7 +357,7 @@ def expect_kind(
 
 def one_or_several(value: Any, kind: type[T] | UnionType, where: object, expected: str) -> tuple[T, ...]:
     """One value or a sequence of them as a tuple; `InputError` for anything of another kind."""
-    given = (value,) if isinstance(value, kind) else value
-    if not isinstance(given, Sequence) or not all(isinstance(one, kind) for one in given):
+    values = (value,) if isinstance(value, kind) else value
+    if not isinstance(values, Sequence) or not all(isinstance(item, kind) for item in values):
         raise InputError(where=where, expected=expected, got=value)
-    return tuple(given)
+    return tuple(values)

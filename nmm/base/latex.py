@@ -127,9 +127,9 @@ def _inline(part: object) -> str:
 
 
 def joined(parts: Iterable[object], mark: str = ", ", last: str | None = None) -> Typeset:
-    given = list(parts)
-    marks = [mark] * (len(given) - 2) + [mark if last is None else last]
-    return sentence(*(piece for pair in zip(["", *marks], given, strict=False) for piece in pair))
+    pieces = list(parts)
+    marks = [mark] * (len(pieces) - 2) + [mark if last is None else last]
+    return sentence(*(piece for pair in zip(["", *marks], pieces, strict=False) for piece in pair))
 
 
 def minor_name(columns: Sequence[str]) -> Formula:
@@ -143,10 +143,10 @@ def block(columns: Sequence[str]) -> Formula:
 
 def linear_formula(terms: Iterable[tuple[float, Formula]]) -> Formula:
     """A sum of formulas times whole numbers: "Δ[v, q1] - 2 Δ[v, q2]"."""
-    given = [(n, "" if abs(n) == 1 else f"{abs(n)} ", of) for n, of in terms]
+    numbered = [(n, "" if abs(n) == 1 else f"{abs(n)} ", of) for n, of in terms]
     return Formula(
-        signed_sum((n, number + of) for n, number, of in given),
-        signed_sum((n, number + of.latex) for n, number, of in given),
+        signed_sum((n, number + of) for n, number, of in numbered),
+        signed_sum((n, number + of.latex) for n, number, of in numbered),
     )
 
 

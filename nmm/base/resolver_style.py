@@ -56,23 +56,23 @@ def looks(resolvers: Sequence[str]) -> list[Look]:
     spare = [color for color in OF_RUNS if color not in {color for color, _ in own.values()}]
     colors = [*spare, *(color for color in OF_RUNS if color not in spare)]
     every = [(color, dashes) for dashes in DASHES for color in colors]
-    others = cycle([one for one in every if one not in own.values()] or every)
-    found: list[Look] = []
+    others = cycle([look for look in every if look not in own.values()] or every)
+    assigned: list[Look] = []
     for k, resolver in enumerate(resolvers):
         earlier = resolvers[:k].count(resolver)
         name = resolver.upper() if not earlier else f"{resolver.upper()} ({earlier + 1})"
         color, dashes = own[resolver] if resolver in own and not earlier else next(others)
-        found.append(Look(name, color, dashes))
-    return found
+        assigned.append(Look(name, color, dashes))
+    return assigned
 
 
 def looks_of_labels(labels: Sequence[str]) -> list[Look]:
     """The looks of labelled motions, a resolver's where the label names one; repeated labels get a number."""
-    found = []
+    labelled = []
     for k, (label, look) in enumerate(zip(labels, looks([label.lower() for label in labels]), strict=True)):
         earlier = labels[:k].count(label)
-        found.append(look._replace(name=f"{label} ({earlier + 1})" if label and earlier else label))
-    return found
+        labelled.append(look._replace(name=f"{label} ({earlier + 1})" if label and earlier else label))
+    return labelled
 
 
 def pretty(name: str) -> str:

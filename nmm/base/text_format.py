@@ -79,8 +79,10 @@ def number_text(value: float | None, digits: int = 3) -> str:
 def apart(value: float, *others: float, digits: int = 4) -> list[str]:
     """Numbers in as few digits, no fewer than `digits`, as tell the first from the others: 3.0001 from 3."""
     for count in range(digits, 18):
-        texts = [f"{one:.{count}g}" for one in (value, *others)]
-        if all(text != texts[0] or one == value for text, one in zip(texts, (value, *others), strict=True)):
+        texts = [f"{number:.{count}g}" for number in (value, *others)]
+        if all(
+            text != texts[0] or number == value for text, number in zip(texts, (value, *others), strict=True)
+        ):
             break
     return texts
 
@@ -116,8 +118,8 @@ def printable(text: str) -> str:
 
 def short_words(text: str, limit: int = 280) -> str:
     """The text with the middle of each longer word left out: a name in a file may be as long as the file."""
-    kept = limit // 2 - 1
-    return re.sub(rf"\S{{{limit + 1},}}", lambda word: f"{word[0][:kept]}…{word[0][-kept:]}", text)
+    half = limit // 2 - 1
+    return re.sub(rf"\S{{{limit + 1},}}", lambda word: f"{word[0][:half]}…{word[0][-half:]}", text)
 
 
 def folded(line: str, limit: int = 300) -> list[str]:

@@ -28,25 +28,25 @@ _COUNTS = {2: "two", 3: "three"}
 def placed(table: Mapping[str, Words]) -> dict[str, Words]:
     """The same, each sentence preceded by its place: the arm, the included file, the link or joint."""
 
-    def write(words: Words, **given: object) -> str:
-        return _place(given) + sentence(words, given)
+    def write(words: Words, **values: object) -> str:
+        return _place(values) + sentence(words, values)
 
     return {code: partial(write, words) for code, words in table.items()}
 
 
-def _place(given: Mapping[str, object]) -> str:
-    text = f"{given['arm']}: " if "arm" in given else ""
-    text += f"SRDF {given['srdf']}: " if "srdf" in given else ""
-    if "file" in given:
-        line = f":{given['line']}" if "line" in given else ""
-        text += f"in {given['file']}{line}: "
-    owners = [f"{kind} {given[kind]!r}" for kind in ("link", "joint") if kind in given]
-    owners += [str(given["part"])] if "part" in given else []
+def _place(values: Mapping[str, object]) -> str:
+    text = f"{values['arm']}: " if "arm" in values else ""
+    text += f"SRDF {values['srdf']}: " if "srdf" in values else ""
+    if "file" in values:
+        line = f":{values['line']}" if "line" in values else ""
+        text += f"in {values['file']}{line}: "
+    owners = [f"{kind} {values[kind]!r}" for kind in ("link", "joint") if kind in values]
+    owners += [str(values["part"])] if "part" in values else []
     return f"{text}{', '.join(owners)}: " if owners else text
 
 
-def _mesh_missing(*, mesh: str, cause: str, shape: str = "", **given: object) -> str:
-    return f"mesh {mesh!r}: {_CAUSES[cause].format(**given)}{_SHAPES[shape]}"
+def _mesh_missing(*, mesh: str, cause: str, shape: str = "", **values: object) -> str:
+    return f"mesh {mesh!r}: {_CAUSES[cause].format(**values)}{_SHAPES[shape]}"
 
 
 def _only_macros(*, name: str, macros: Mapping[str, str], **_: object) -> str:
@@ -59,10 +59,10 @@ def _only_macros(*, name: str, macros: Mapping[str, str], **_: object) -> str:
 
 
 def _macro_parameters_missing(*, macro: str, missing: Sequence[str], name: str, **_: object) -> str:
-    if blocks := [one for one in missing if one.startswith("*")]:
+    if blocks := [parameter for parameter in missing if parameter.startswith("*")]:
         cure = f"{blocks[0]} is a block of elements: write a .xacro file that includes {name} and calls it"
     else:
-        cure = " ".join(f"-a {one}=VALUE" for one in missing[:3])
+        cure = " ".join(f"-a {parameter}=VALUE" for parameter in missing[:3])
     return f"holds no robot but one macro, {macro}, whose parameters {few(missing)} have no default: {cure}"
 
 
@@ -79,32 +79,32 @@ def _lined(names: Sequence[str], lines: Mapping[str, int | str]) -> str:
     return few([f"{name} ({at[name]})" if name in at else name for name in names])
 
 
-def _times(count: int, given: Mapping[str, object]) -> str:
+def _times(count: int, values: Mapping[str, object]) -> str:
     """How often, and where first."""
-    line = f"line {given['line']}" if "line" in given else ""
+    line = f"line {values['line']}" if "line" in values else ""
     often = f"{count} times{', first in ' if line else ''}" if count > 1 else ""
     return f" ({often}{line})" if often or line else ""
 
 
 def _unknown(
-    *, element: str, near: str, count: int, inside: str = "", attribute: str = "", **given: object
+    *, element: str, near: str, count: int, inside: str = "", attribute: str = "", **values: object
 ) -> str:
     what = f"<{element}> {attribute}" if attribute else f"<{element}> in <{inside}>"
     meant = f": did you mean {near}?" if near else ""
-    return f"{what}{_times(count, given)} is not known and does not count{meant}"
+    return f"{what}{_times(count, values)} is not known and does not count{meant}"
 
 
-def _soft_limits(*, limits: Mapping[str, Sequence[float]], count: int, **given: object) -> str:
+def _soft_limits(*, limits: Mapping[str, Sequence[float]], count: int, **values: object) -> str:
     soft = [f"{name}: [{low:g}, {high:g}]" for name, (low, high) in limits.items()]
     return (
-        f"soft limits of <safety_controller>{_times(count, given)} are not kept: {few(soft)}; they are where "
-        "given as limits of position (Limits(position=...))"
+        f"soft limits of <safety_controller>{_times(count, values)} are not kept: {few(soft)}; they are "
+        "where given as limits of position (Limits(position=...))"
     )
 
 
-def _unread(*, element: str, why: str, count: int, attribute: str = "", **given: object) -> str:
+def _unread(*, element: str, why: str, count: int, attribute: str = "", **values: object) -> str:
     what = f"<{element}> {attribute}" if attribute else f"<{element}>"
-    return f"{what}{_times(count, given)} is not read: {why}"
+    return f"{what}{_times(count, values)} is not read: {why}"
 
 
 WORDS = placed(
@@ -193,12 +193,12 @@ WORDS = placed(
         "attribute_unknown": _unknown,
         "element_unread": _unread,
         "attribute_unread": _unread,
-        "element_again": lambda *, element, inside, count, **given: (
-            f"a further <{element}> in one <{inside}>{_times(count, given)} does not count: the first does"
+        "element_again": lambda *, element, inside, count, **values: (
+            f"a further <{element}> in one <{inside}>{_times(count, values)} does not count: the first does"
         ),
         "soft_limits": _soft_limits,
-        "limits_of_continuous": lambda *, names, count, **given: (
-            f"<limit> lower and upper{_times(count, given)} do not count at continuous joints: {few(names)}"
+        "limits_of_continuous": lambda *, names, count, **values: (
+            f"<limit> lower and upper{_times(count, values)} do not count at continuous joints: {few(names)}"
         ),
         "dynamics_empty": "<dynamics> has neither damping nor friction",
         # ------------------------------------------------------------------ what is odd
@@ -227,9 +227,9 @@ MOST_NAMED = 12
 def refusal(file: object, *findings: Finding, lines: bool = True) -> RobotError:
     """A one-line error with at most `MOST_NAMED` findings; `lines`: their line numbers are the file's own."""
     shown = []
-    for one in findings[:MOST_NAMED]:
-        line = line_of(one) if lines else None
-        text = one_line(short_words(str(one)), 1000)
+    for finding in findings[:MOST_NAMED]:
+        line = line_of(finding) if lines else None
+        text = one_line(short_words(str(finding)), 1000)
         shown.append(text if line is None else f"line {line}: {text}")
     shown += [f"and {len(findings) - MOST_NAMED} more"] if len(findings) > MOST_NAMED else []
     return RobotError("; ".join(shown), where=str(file), findings=findings)

@@ -116,15 +116,15 @@ WORDS = placed(
         "wheels_left_out": "wheels that only roll, left out of q: {names:few}",
         "swivels_left_out": "joints that steer them or swivel, left out of q: {names:few}",
         "wheels_held": "wheels of a fixed base, which stand still: {names:few}",
-        "not_a_wheel": lambda *, name, why, **given: (
-            f"{name} stays a coordinate in spite of its name: {NO_WHEEL[why].format(**given)}"
+        "not_a_wheel": lambda *, name, why, **values: (
+            f"{name} stays a coordinate in spite of its name: {NO_WHEEL[why].format(**values)}"
         ),
         "taken_for_casters": lambda *, names, **_: (
             f"each turns a wheel about an upright axis through it and is taken for a caster: {few(names)}; "
             f"if they steer: --steer {','.join(names[:2])} (steer={[*names[:2]]!r})"
         ),
-        "no_wheel": lambda *, name, why, **given: (
-            f"joint {name!r} is no wheel: {NO_WHEEL[why].format(**given)}"
+        "no_wheel": lambda *, name, why, **values: (
+            f"joint {name!r} is no wheel: {NO_WHEEL[why].format(**values)}"
         ),
         "radius_unknown": lambda *, names, **_: (
             f"nothing tells the radius of wheels {few(names)}: they stand still in playback, and limit no "

@@ -14,10 +14,10 @@ MOTORS = "motors"
 
 def line(findings: Sequence[Finding]) -> str:
     """Related findings on one line; their leg, if any, is named once."""
-    legs = [one.where.get("leg") for one in findings]
+    legs = [finding.where.get("leg") for finding in findings]
     texts = [
-        f"{_before(leg) if leg and leg != earlier else ''}{one}"
-        for one, leg, earlier in zip(findings, legs, [None, *legs], strict=False)
+        f"{_before(leg) if leg and leg != earlier else ''}{finding}"
+        for finding, leg, earlier in zip(findings, legs, [None, *legs], strict=False)
     ]
     if legs and legs[0] and legs[0].get("also"):
         times = listed([f"{t:.4g}" for t in legs[0]["also"]])
@@ -34,7 +34,7 @@ def _replanned(plans: Sequence[Mapping[str, float]], **_: Any) -> str:
     when = f"at t = {first['t']:.4g} s"
     if len(plans) > 1:
         when = f"{len(plans)} times from t = {first['t']:.4g} to {last['t']:.4g} s"
-    m, rad = (max(one[unit] for one in plans) for unit in ("m", "rad"))
+    m, rad = (max(plan[unit] for plan in plans) for unit in ("m", "rad"))
     return (
         f"the robot left its plan {when}, by up to {m:.3g} m and {rad:.3g} rad, and went on with another; "
         f"the last one takes {last['duration']:.4g} s"
@@ -45,11 +45,11 @@ def _inputs_unmet(
     samples: int, share: float, largest: float, relative: float, t: float, scale: float = 1.0, **of: Any
 ) -> str:
     whole = f"{100 * relative:.3g} % of it" if relative <= 1.0 else "more than the rate itself"
-    kept = of.get("kept", ())
+    limits = of.get("kept", ())
     if scale >= 1.0:
         scaled = ""
-    elif kept:
-        scaled = f"; under its {' and '.join(kept)} λ falls to {scale:.3g}"
+    elif limits:
+        scaled = f"; under its {' and '.join(limits)} λ falls to {scale:.3g}"
     else:
         scaled = f"; its resolver scales the rate on purpose, down to {scale:.3g} of it"
     if "rows" in of:
@@ -62,18 +62,18 @@ def _inputs_unmet(
 
 
 def _above_decay(t: float, initial: float, errors: Sequence[Mapping[str, Any]], end: float, **_: Any) -> str:
-    told = [f"{initial:.3g} at first"]
-    for one in errors:
-        when = "at the end" if one["t"] == end else f"at t = {one['t']:.4g} s"
-        told.append(f"{one['error']:.3g} {when} (expected {one['promised']:.2g})")
-    return f"the error left its expected decay at t = {t:.4g} s: {', '.join(told)}"
+    parts = [f"{initial:.3g} at first"]
+    for sample in errors:
+        when = "at the end" if sample["t"] == end else f"at t = {sample['t']:.4g} s"
+        parts.append(f"{sample['error']:.3g} {when} (expected {sample['promised']:.2g})")
+    return f"the error left its expected decay at t = {t:.4g} s: {', '.join(parts)}"
 
 
-def _beyond(one: Mapping[str, Any]) -> str:
-    lower = -math.inf if one["lower"] is None else one["lower"]
-    upper = math.inf if one["upper"] is None else one["upper"]
-    value, least, most = apart(one["value"], lower, upper)
-    return f"{one['name']} at {one['t']:.3g} s ({value} {one['unit']}; from {least} to {most})"
+def _beyond(row: Mapping[str, Any]) -> str:
+    lower = -math.inf if row["lower"] is None else row["lower"]
+    upper = math.inf if row["upper"] is None else row["upper"]
+    value, least, most = apart(row["value"], lower, upper)
+    return f"{row['name']} at {row['t']:.3g} s ({value} {row['unit']}; from {least} to {most})"
 
 
 def _too_fast(name: str, largest: float, limit: float, unit: str) -> str:
@@ -99,19 +99,19 @@ def _left_plan(
 def _start_too_near(
     distance: float, name: str, clearance: float, back: float | None, own: bool = False, **_: Any
 ) -> str:
-    clear, kept = apart(clearance, distance)
+    clear, least = apart(clearance, distance)
     return (
-        f"the start is nearer than the distance to keep, {kept} m: {name}, {clear} m; "
+        f"the start is nearer than the distance to keep, {least} m: {name}, {clear} m; "
         f"{'not back at the end' if back is None else f'back at t = {back:.3g} s'}"
         f"{_OVERLAP if own and clearance <= 0.0 else ''}"
     )
 
 
 def _distance_not_kept(distance: float, samples: int, name: str, clearance: float, t: float, **_: Any) -> str:
-    clear, kept = apart(clearance, distance)
+    clear, least = apart(clearance, distance)
     return (
-        f"the distance of {kept} m could not be kept in {counted(samples, 'sample')}: {name} came to {clear} "
-        f"m at t = {t:.3g} s"
+        f"the distance of {least} m could not be kept in {counted(samples, 'sample')}: {name} came to "
+        f"{clear} m at t = {t:.3g} s"
     )
 
 
@@ -127,16 +127,16 @@ def _degrees(angles: Mapping[str, float], **_: Any) -> str:
 def _tips(
     margin: float | None, edge: Sequence[str], t: float, jumps: Mapping[str, float] | None = None, **_: Any
 ) -> str:
-    said = f"the robot tips at t = {t:.4g} s"
+    text = f"the robot tips at t = {t:.4g} s"
     if margin is None:
-        said += ": the ground would have to pull it down"
+        text += ": the ground would have to pull it down"
     else:
         outside = f"{-1e3 * margin:.3g} mm outside the edge from {edge[0]} to {edge[1]}"
-        said += f": the zero-moment point is {outside}"
+        text += f": the zero-moment point is {outside}"
     if not jumps:
-        return said
+        return text
     names = few([f"{name} by {change:.3g}" for name, change in jumps.items()], shown=3)
-    return f"{said}; inputs jump there ({names}): limits.acceleration spreads that over time"
+    return f"{text}; inputs jump there ({names}): limits.acceleration spreads that over time"
 
 
 #: What helps where two links of the robot touch before it has moved.
@@ -282,13 +282,13 @@ WORDS: Mapping[str, Words] = {
     ),
     "inputs_beyond_limits": lambda inputs, **_: (
         "inputs exceed their limits: "
-        + ", ".join(_too_fast(one["name"], one["largest"], one["limit"], one["unit"]) for one in inputs)
+        + ", ".join(_too_fast(row["name"], row["largest"], row["limit"], row["unit"]) for row in inputs)
     ),
     "functions_beyond_limits": lambda functions, **_: (
         "limits of functions are broken: "
         + "; ".join(
-            f"{_beyond(one)}, by {one['beyond']:.3g} at most, in {one['samples']} of {one['of']} samples"
-            for one in functions
+            f"{_beyond(row)}, by {row['beyond']:.3g} at most, in {row['samples']} of {row['of']} samples"
+            for row in functions
         )
     ),
     "backed_off": "the error stalled and the robot backed off, at t = {times:all %.3g s}",

@@ -191,17 +191,17 @@ def settle(
 @compiled
 def most_violated(rows: Rows, scale: float, y: Array, tolerance: float) -> int:
     """The member whose bound is violated by the greatest length; 0 for none beyond rounding."""
-    c, found, worst = rows.G.shape[0], 0, 0.0
+    c, member, worst = rows.G.shape[0], 0, 0.0
     for i in range(c):
-        value, given = dot(rows.G[i], y), (1.0 - scale) * rows.give[i]
+        value, shift = dot(rows.G[i], y), (1.0 - scale) * rows.give[i]
         for side in range(2):
-            limit = rows.lower[i] - given if side == 0 else rows.upper[i] + given
+            limit = rows.lower[i] - shift if side == 0 else rows.upper[i] + shift
             missing = limit - value if side == 0 else value - limit
             if missing > tolerance * max(1.0, abs(limit)):
                 missing /= max(norm(rows.G[i]), 1e-150)
                 if missing > worst:
-                    found, worst = 1 + i + side * c, missing
-    return found
+                    member, worst = 1 + i + side * c, missing
+    return member
 
 
 @compiled

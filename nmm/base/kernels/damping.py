@@ -91,24 +91,24 @@ def damped_solution(
         count = min(s, m)
         beside = max(dot(b, b) - dot(wanted, wanted), 0.0) if s > m else 0.0
         own = resolved(A, wanted, beside, dt, law)
-        asked, given = beside, 0.0
+        asked, achieved = beside, 0.0
         for i in range(count):
             square, along = dot(A[i], A[i]), dot(A[i], u0)
             bottom = square + damping_squared(own, least if law.mode == VARIABLE else math.sqrt(square))
             asked += wanted[i] * wanted[i]
-            given += square / bottom * wanted[i] * wanted[i]
+            achieved += square / bottom * wanted[i] * wanted[i]
             share = min(square / (law.threshold * law.threshold), 1.0)
-            kept = share * (2.0 - share) / square if square > 0.0 else 0.0
+            weight = share * (2.0 - share) / square if square > 0.0 else 0.0
             if bottom > square:
                 add(damped, wanted[i] / bottom, A[i])
             for j in range(m):
                 done[j] += A[i, j] * wanted[i] / bottom
-                u[j] += A[i, j] * (wanted[i] / bottom - kept * along)
+                u[j] += A[i, j] * (wanted[i] / bottom - weight * along)
             if square > NOTHING * NOTHING and taken < m:
                 for j in range(m):
                     above[taken, j] = A[i, j] / math.sqrt(square)
                 taken += 1
-        shares[level] = given / asked if asked > 0.0 else 1.0
+        shares[level] = achieved / asked if asked > 0.0 else 1.0
         any_damped = any_damped or s > m or damping_squared(own, least) > 0.0
         smallest = min(smallest, least)
         first = ends[level]

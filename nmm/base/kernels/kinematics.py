@@ -110,23 +110,23 @@ def place_frames(
     Of the last two only entries that can be nonzero are written.
     """
     count = joints.parent.shape[0]
-    places, twists, here, v = scratch((count, 12)), scratch((count, 6)), scratch((1, 12)), scratch(3)
+    places, twists, place, v = scratch((count, 12)), scratch((count, 6)), scratch((1, 12)), scratch(3)
     place_joints(joints, q, places)
     axes(joints, places, twists)
     for k in range(frames.carrier.shape[0]):
         if frames.carrier[k] < 0:
             center_of_mass(joints, frames, places, twists, placements[k], jacobians[k])
             continue
-        compose(places, frames.carrier[k], frames.placement, k, here, 0)
+        compose(places, frames.carrier[k], frames.placement, k, place, 0)
         for i in range(3):
             for a in range(4):
-                placements[k, i, a] = here[0, 3 * a + i]
+                placements[k, i, a] = place[0, 3 * a + i]
         J = jacobians[k]
         first, last = frames.first[k], frames.first[k + 1]
         for c in range(first, last):
             i = frames.chain[c]
             j = joints.coordinate[i]
-            moved(places, twists, i, here[0, 9], here[0, 10], here[0, 11], v)
+            moved(places, twists, i, place[0, 9], place[0, 10], place[0, 11], v)
             for a in range(3):
                 J[a, j] = v[a]
                 J[3 + a, j] = twists[i, 3 + a]
@@ -142,10 +142,10 @@ def differentiate(joints: Joints, chain: Array, first: int, last: int, J: Array,
         for d in range(first, last):
             k = joints.coordinate[chain[d]]
             # The joint nearer to the world turns the other one's velocity.
-            one, two = (j, k) if d > c else (k, j)
+            near, far = (j, k) if d > c else (k, j)
             for a in range(3):
                 x, y = (a + 1) % 3, (a + 2) % 3
-                H[a, j, k] = J[3 + x, one] * J[y, two] - J[3 + y, one] * J[x, two]
+                H[a, j, k] = J[3 + x, near] * J[y, far] - J[3 + y, near] * J[x, far]
                 H[3 + a, j, k] = 0.0 if d >= c else J[3 + x, k] * J[3 + y, j] - J[3 + y, k] * J[3 + x, j]
 
 

@@ -18,9 +18,9 @@ MOST_SWEEPS = 40
 
 
 @compiled
-def copied(one: Array, other: Array) -> None:
-    for i in range(other.shape[0]):
-        other[i] = one[i]
+def copied(source: Array, target: Array) -> None:
+    for i in range(target.shape[0]):
+        target[i] = source[i]
 
 
 @compiled
@@ -270,14 +270,14 @@ def singular_rows(A: Array, R: Array) -> tuple[float, float]:
 @compiled
 def orthogonalised(A: Array, R: Array, i: int, k: int) -> bool:
     """Rotate rows i and k until they are orthogonal; returns whether that was needed."""
-    one, other, product = 0.0, 0.0, 0.0
+    square_i, square_k, product = 0.0, 0.0, 0.0
     for j in range(A.shape[1]):
-        one += A[i, j] * A[i, j]
-        other += A[k, j] * A[k, j]
+        square_i += A[i, j] * A[i, j]
+        square_k += A[k, j] * A[k, j]
         product += A[i, j] * A[k, j]
-    if not abs(product) > EPSILON * math.sqrt(one) * math.sqrt(other):
+    if not abs(product) > EPSILON * math.sqrt(square_i) * math.sqrt(square_k):
         return False
-    zeta = (other - one) / (2.0 * product)
+    zeta = (square_k - square_i) / (2.0 * product)
     tangent = (1.0 if zeta >= 0.0 else -1.0) / (abs(zeta) + math.hypot(1.0, zeta))
     cosine = 1.0 / math.hypot(1.0, tangent)
     sine = cosine * tangent
@@ -289,6 +289,6 @@ def orthogonalised(A: Array, R: Array, i: int, k: int) -> bool:
 @compiled
 def turn(A: Array, i: int, k: int, cosine: float, sine: float) -> None:
     for j in range(A.shape[1]):
-        one, other = A[i, j], A[k, j]
-        A[i, j] = cosine * one - sine * other
-        A[k, j] = sine * one + cosine * other
+        first, second = A[i, j], A[k, j]
+        A[i, j] = cosine * first - sine * second
+        A[k, j] = sine * first + cosine * second
