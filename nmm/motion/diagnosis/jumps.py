@@ -47,7 +47,7 @@ def chattering(t: Array, u: Array, names: Sequence[str]) -> Finding | None:
     rows = list(_in_rows(back, IN_A_ROW))
     if not rows:
         return None
-    i, steps = max(rows, key=lambda one: size[one[1], one[0]].max())
+    i, steps = max(rows, key=lambda row: size[row[1], row[0]].max())
     largest, end = float(size[steps, i].max()), float(t[steps[-1] + 1])
     values = {"input": names[i], "jumps": len(steps), "end": end, "size": largest}
     return Finding("chattering", values, {"t": float(t[steps[0] + 1])})
@@ -68,7 +68,7 @@ def moving_otherwise(
     rows = list(_in_rows(flags, STEPS))
     if not rows:
         return None
-    i, steps = max(rows, key=lambda one: len(one[1]))
+    i, steps = max(rows, key=lambda row: len(row[1]))
     values = {
         "name": names[i],
         "end": float(t[steps[-1] + 1]),

@@ -41,5 +41,5 @@ def _torques(run: Trajectory) -> Torques | None:
 
 def motor_findings(run: Trajectory) -> tuple[Finding, ...]:
     """Motors over their effort, and a robot that tips."""
-    found = motor_torques(run)
-    return () if found is None else found.findings
+    torques = motor_torques(run)
+    return () if torques is None else torques.findings

@@ -76,10 +76,10 @@ def stretched(controller: Controller, q: Array, J: Array) -> Finding | None:
 
 
 def singularity(
-    controller: Controller, samples: Samples, q: Array, found: Departure
+    controller: Controller, samples: Samples, q: Array, departure: Departure
 ) -> Iterator[Finding | None]:
     """Whether J was singular between two samples, or nearly so, where the error exceeds its decay."""
-    first, last = max(0, found.first - 1), min(len(q) - 1, found.worst + 1)
+    first, last = max(0, departure.first - 1), min(len(q) - 1, departure.worst + 1)
     norm = np.linalg.norm(samples.error, axis=1)
     grown = np.diff(norm[first : last + 1]) >= JUMP * (1.0 + norm[first:last])
     if grown.any():
@@ -102,18 +102,18 @@ def near_singularity(
     return Finding(code, values, {"t": float(t)})
 
 
-def switching(samples: Samples, found: Departure) -> Finding | None:
+def switching(samples: Samples, departure: Departure) -> Finding | None:
     switches = np.any(np.diff(samples.partition, axis=0) != 0, axis=1)
-    count = int(np.sum(switches[max(0, found.first - 1) :]))
+    count = int(np.sum(switches[max(0, departure.first - 1) :]))
     return Finding("partition_switching", {"times": count}) if count >= SWITCHES else None
 
 
-def inputs_fell_short(controller: Controller, samples: Samples, found: Departure) -> Finding | None:
+def inputs_fell_short(controller: Controller, samples: Samples, departure: Departure) -> Finding | None:
     """With what damped them, where damped least squares did at the worst sample."""
-    excess = float(np.linalg.norm(samples.error[found.worst]) - found.bound[found.worst])
-    if found.unmet[found.worst] < 0.5 * excess:
+    excess = float(np.linalg.norm(samples.error[departure.worst]) - departure.bound[departure.worst])
+    if departure.unmet[departure.worst] < 0.5 * excess:
         return None
-    resolver, J = controller.resolver, samples.J[found.worst]
+    resolver, J = controller.resolver, samples.J[departure.worst]
     values: dict[str, float] = {}
     if isinstance(resolver, DampedLeastSquares):
         root = resolver.setup(controller.solver.dimensions).numbers[DampedLeastSquares.root_at :]
@@ -147,9 +147,9 @@ def still_moving(controller: Controller, samples: Samples) -> Finding | None:
     return Finding("still_moving", values)
 
 
-def unresolved(samples: Samples, found: Departure) -> Finding | None:
+def unresolved(samples: Samples, departure: Departure) -> Finding | None:
     """The change of the inputs along the step on which the error exceeds its expected decay."""
-    k = max(1, found.first)
+    k = max(1, departure.first)
     before, after = samples.u[k - 1], samples.u[k]
     larger = max(float(np.linalg.norm(before)), float(np.linalg.norm(after)))
     change = float(np.linalg.norm(after - before))
@@ -188,17 +188,17 @@ def _ratios(controller: Controller, J: Array) -> Array:
 def _arms(controller: Controller, q: Array) -> Iterator[tuple[str, dict[int, int], Reach, Array]]:
     """Frames positioned in the world by finite arms: rows of world axes, the arm, its origin (3,)."""
     robot, row = controller.robot, 0
-    found: dict[str, dict[int, int]] = {}
+    by_frame: dict[str, dict[int, int]] = {}
     for task in controller.task:
         function = task.function
         rows = function.rows(robot)
         if getattr(function, "relative_to", None) is None and hasattr(function, "frame"):
-            for i, one in enumerate(rows):
-                frame, _, part = one.name.rpartition(".")
+            for i, task_row in enumerate(rows):
+                frame, _, part = task_row.name.rpartition(".")
                 if frame == function.frame and WORLD_PARTS.get(part, 3) < 3:
-                    found.setdefault(frame, {})[WORLD_PARTS[part]] = row + i
+                    by_frame.setdefault(frame, {})[WORLD_PARTS[part]] = row + i
         row += len(rows)
-    for frame, places in found.items():
+    for frame, places in by_frame.items():
         arm = reach(robot, frame)
         if arm is not None and np.isfinite(arm.length):
             yield frame, places, arm, joint_position(robot, q, arm.joint)

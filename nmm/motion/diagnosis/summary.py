@@ -65,23 +65,27 @@ def summarise(trajectory: Trajectory, motors: bool = True) -> dict[str, Any]:
         "frame": trajectory.frame,
         "events": [event._asdict() for event in trajectory.events],
         "obstacles": [
-            {"name": one.name, "moves": one.moves, "shape": obstacle_as_json(one.shape)[0]}
-            for one in trajectory.obstacles
+            {"name": obstacle.name, "moves": obstacle.moves, "shape": obstacle_as_json(obstacle.shape)[0]}
+            for obstacle in trajectory.obstacles
         ],
     }
     if trajectory.cameras:
-        summary["cameras"] = [one.as_json() for one in trajectory.cameras]
+        summary["cameras"] = [camera.as_json() for camera in trajectory.cameras]
     if count:
         if trajectory.clearance_names:
             summary["clearance_names"] = list(trajectory.clearance_names)
             summary["clearance_asked"] = trajectory.clearance_asked
         summary |= _numbers(trajectory)
-    if redundancy["kinematic"] == 0 and not any(one.code == "no_redundancy" for one in trajectory.findings):
-        found = Finding("no_redundancy")
-        summary["findings"].append({**found.as_json(), "line": f"warnings.{len(summary['warnings'])}"})
-        summary["warnings"].append(str(found))
+    if redundancy["kinematic"] == 0 and not any(
+        finding.code == "no_redundancy" for finding in trajectory.findings
+    ):
+        finding = Finding("no_redundancy")
+        summary["findings"].append({**finding.as_json(), "line": f"warnings.{len(summary['warnings'])}"})
+        summary["warnings"].append(str(finding))
     if motors:
-        summary["findings"] += [{**one.as_json(), "line": MOTORS} for one in motor_findings(trajectory)]
+        summary["findings"] += [
+            {**finding.as_json(), "line": MOTORS} for finding in motor_findings(trajectory)
+        ]
     return summary
 
 
@@ -97,16 +101,16 @@ def without_velocity_limit(trajectory: Trajectory) -> list[str]:
 
 
 def _numbers(trajectory: Trajectory) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for one in placed():
-        numbers = [*one.numbers, *(number for number in RUN_NUMBERS if number.after == one.name)]
-        x = trajectory[one.name] if numbers else ()
+    values: dict[str, Any] = {}
+    for series in placed():
+        numbers = [*series.numbers, *(number for number in RUN_NUMBERS if number.after == series.name)]
+        x = trajectory[series.name] if numbers else ()
         for number in numbers if len(x) else ():
             if number.after:
-                found[number.key] = number.of(trajectory)
+                values[number.key] = number.of(trajectory)
             else:
-                found[number.key] = np.asarray(number.of(trajectory.t, x)).item()
-    return found
+                values[number.key] = np.asarray(number.of(trajectory.t, x)).item()
+    return values
 
 
 def _nearest_pair(run: Trajectory) -> str:
