@@ -10,7 +10,6 @@ import time
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
 from nmm.base.arrays import Array, Integers
 from nmm.base.kernels.compiled import (
@@ -22,6 +21,7 @@ from nmm.base.kernels.compiled import (
     view,
 )
 from nmm.base.kernels.record_layout import IntegerVector, Vector, keep, kept, put_back, record_type, views
+from nmm.base.kernels.signatures import float64, int64
 from nmm.control.controller import Controller
 from nmm.control.functions.program import BESIDE
 from nmm.control.goal import Goal, norms, unit_codes
@@ -57,9 +57,9 @@ class Choice(NamedTuple):
     floats: Vector
 
 
-ADVANCE_SAMPLES = types.int64(
-    *(types.int64[::1], types.float64[::1], record_type(Tableau), types.float64[::1], types.int64),
-    *(types.int64, types.int64, record_type(Ends), record_type(Choice), record_type(Recorded)),
+ADVANCE_SAMPLES = int64(
+    *(int64[::1], float64[::1], record_type(Tableau), float64[::1], int64),
+    *(int64, int64, record_type(Ends), record_type(Choice), record_type(Recorded)),
 )
 
 

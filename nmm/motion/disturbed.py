@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import types
 
 from nmm.base.arrays import Array, Integers
 from nmm.base.errors import InputError
 from nmm.base.findings import Finding
 from nmm.base.kernels.compiled import checked_by_caller, compiled, compiled_without_gil, scratch, view
 from nmm.base.kernels.record_layout import record_type, views
+from nmm.base.kernels.signatures import float64, int64
 from nmm.control.controller import Controller
 from nmm.control.functions.program import BESIDE, LaidOut, run_program
 from nmm.control.goal import Goal
@@ -50,9 +50,9 @@ class Acting(Around):
         return ahead
 
 
-_DRIFT = types.int64(
-    *(types.int64[::1], types.float64[::1], types.float64[::1], types.int64, types.int64),
-    *(record_type(Disturbed), types.int64, record_type(Recorded)),
+_DRIFT = int64(
+    *(int64[::1], float64[::1], float64[::1], int64, int64),
+    *(record_type(Disturbed), int64, record_type(Recorded)),
 )
 #: Samples in one compiled call, which cannot be interrupted.
 AT_ONCE = 200

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from places import ROOT
 
-from nmm.base.kernels import compiled, instructions
+from nmm.base.kernels import compiled, instructions, trial
 from nmm.cli.paper.cases import CASES
 from nmm.motion.trajectory import Trajectory
 from nmm.scenario import Scenario
@@ -114,7 +114,8 @@ def run(code: str, folder: Path, **environment: str) -> tuple[list[str], list[st
 def test_instructions_come_as_expected(tmp_path: Path) -> None:
     """Otherwise all other tests measure the wrong path."""
     assert compiled.problem() is None
-    assert compiled._trial() is None
+    assert trial.fault() is None
+    assert trial._tried() is None
     for _ in range(2):  # the second time from the disk
         printed, errors = run(PARTS, tmp_path, XDG_CACHE_HOME=str(tmp_path / "cache"))
         assert json.loads(printed[0]) == ANSWERS
@@ -152,7 +153,7 @@ def test_other_insides_are_noticed(other: str, tmp_path: Path) -> None:
 def test_a_command_says_it_in_one_line(tmp_path: Path) -> None:
     change, _ = OTHERS["a name is missing"]
     command = "import sys; from nmm.cli import main; sys.argv[1:] = ['info', 'unicycle_2r']; main()"
-    printed, lines = run(f"{change}\n{command}", tmp_path)
+    printed, lines = run(f"{change}\n{command}", tmp_path, XDG_CACHE_HOME=str(tmp_path / "cache"))
     assert any("unicycle_2r" in line for line in printed)
     (line,) = lines
     assert line.startswith(f"numba {numba.__version__}: ")

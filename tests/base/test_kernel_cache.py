@@ -15,15 +15,15 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
-from numba import types
 
 from nmm.base import disk_cache
 from nmm.base.arrays import Array
 from nmm.base.kernels import cache
 from nmm.base.kernels.compiled import compiled
+from nmm.base.kernels.signatures import float64, void
 
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
-SIGNATURE = types.void(types.float64[::1], types.float64)
+SIGNATURE = void(float64[::1], float64)
 
 
 def shift(values: Array, by: float) -> None:

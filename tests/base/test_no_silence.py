@@ -286,15 +286,29 @@ class Finder:
             signal.raise_signal(signal.SIGINT)
 
 sys.meta_path.insert(0, Finder())
+import numpy as np
 import nmm
+
+def velocity_map():
+    G, G_q = np.zeros((3, 2)), np.zeros((3, 2, 3))
+    nmm.Unicycle().velocity_map(np.zeros(3), np.zeros(0), G, G_q)
+    return G[0].tolist()
+
 try:
-    nmm.Scenario.load("unicycle_2r_position")
+    velocity_map()
 except KeyboardInterrupt:
-    print(len(nmm.Scenario.load("unicycle_2r_position").override("duration", 0.1).run()))
+    print(velocity_map())
 """
 
 
-def test_an_interrupted_import_leaves_python_as_it_was() -> None:
-    """Ctrl-C while numba is imported for the first time, and the same call again."""
-    done = subprocess.run([sys.executable, "-c", INTERRUPTED], capture_output=True, text=True, timeout=MOST)
-    assert (done.stdout, done.stderr) == ("21\n", "")
+@pytest.mark.skipif(bool(int(os.environ.get("NUMBA_DISABLE_JIT", "0"))), reason="numba is not imported")
+def test_an_interrupted_import_leaves_python_as_it_was(tmp_path: Path) -> None:
+    """Ctrl-C while numba is imported, as nothing is in the cache, and the same call again."""
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED],
+        env=os.environ | {"XDG_CACHE_HOME": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=MOST,
+    )
+    assert (done.stdout, done.stderr) == ("[1.0, 0.0]\n", "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import subprocess
 import sys
@@ -27,6 +28,27 @@ def test_help_loads_none_of_the_libraries(arguments: list[str]) -> None:
     assert status == (2 if arguments == ["no_such_command"] else 0)
     slow = {"numpy", "numba", "pinocchio", "scipy", "matplotlib", "yaml", "rich"}
     assert slow & {*loaded} == set()
+
+
+RUN = """
+import sys
+import nmm
+robot = nmm.load("unicycle_2r")
+task = nmm.Task(nmm.Position("ee", "xy"), [1.0, 1.0])
+run = nmm.simulate(nmm.Controller(robot, task, nmm.ProjectedGradient()), np.zeros(5), 0.1, dt=0.01)
+assert run.complete and run.summary()["made_with"]["numba"]
+print(sorted({name.split(".")[0] for name in sys.modules}))
+"""
+
+
+def test_a_run_of_what_is_compiled_loads_no_compiler() -> None:
+    """Nor what only plugins need."""
+    code = f"import numpy as np\n{RUN}"
+    for _ in range(2):  # the first may compile
+        done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    loaded = {*ast.literal_eval(done.stdout)}
+    assert {"numpy", "pinocchio", "llvmlite"} <= loaded
+    assert not loaded & {"numba", "sympy", "flint", "pyarrow", "tornado", "matplotlib", "scipy"}
 
 
 def test_kept_kernels_do_not_load_what_compiles() -> None:

@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import types
 
 from nmm.base.arrays import Array
 from nmm.base.kernels import cache
 from nmm.base.kernels.compiled import compiled
+from nmm.base.kernels.signatures import float64, void
 
 from .hunting import Hunt
 from .mutants import CUTS, damaged
 
-SIGNATURE = types.void(types.float64[::1], types.float64)
+SIGNATURE = void(float64[::1], float64)
 
 
 def shift(values: Array, by: float) -> None:

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, Flags, Integers, scalar, vector
@@ -15,6 +14,7 @@ from nmm.base.errors import InputError, expect, expect_known
 from nmm.base.kernels.compiled import checked_by_caller, compiled, integer_scratch, scratch
 from nmm.base.kernels.linear_algebra import residual_norm, singular_rows
 from nmm.base.kernels.record_layout import IntegerVector, Vector, record_type, views
+from nmm.base.kernels.signatures import boolean, float64, int64
 from nmm.control.functions.program import BESIDE, LaidOut
 from nmm.control.step.equations import ControlStep, drive
 from nmm.model.robots.robot import Robot
@@ -51,13 +51,11 @@ class Field(NamedTuple):
 
 
 #: J (s, m), the field, the n before (zeros at first), n (m,) to be written.
-DIRECTION = types.int64(
-    types.Array(types.float64, 2, "C"), record_type(Field), types.float64[::1], types.float64[::1]
-)
+DIRECTION = int64(float64[:, ::1], record_type(Field), float64[::1], float64[::1])
 #: Blocks, the field, e0 (s,), which rows are angles (s,), the n before, ṡ, K, n (m,) to be written.
-FOLLOW = types.int64(
-    *(types.int64[::1], types.float64[::1], record_type(Field), types.float64[::1], types.boolean[::1]),
-    *(types.float64[::1], types.float64, types.float64, types.float64[::1]),
+FOLLOW = int64(
+    *(int64[::1], float64[::1], record_type(Field), float64[::1], boolean[::1]),
+    *(float64[::1], float64, float64, float64[::1]),
 )
 
 

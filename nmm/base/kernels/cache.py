@@ -11,10 +11,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numba
 import platformdirs
 
 from nmm.base.kernels.machine_code import processor
+from nmm.base.machine import numba_version
 
 #: Number of folders to keep.
 KEPT_CACHES = 8
@@ -26,7 +26,7 @@ PACKAGE = KERNELS.parent.parent
 @cache
 def cache_folder() -> Path:
     """Named after a digest of all kernels' text, as numba misses changes in functions that one calls."""
-    digest = hashlib.sha256(numba.__version__.encode())
+    digest = hashlib.sha256(numba_version().encode())
     for source in sorted(PACKAGE.rglob("*.py")):
         text = source.read_bytes()
         if b"nmm.base.kernels" in text or source.parent == KERNELS:

@@ -9,34 +9,42 @@ undecorated function, for programs in plain Python (`NUMBA_DISABLE_JIT=1`, or `p
 from __future__ import annotations
 
 import functools
+import importlib
 import inspect
 import logging
 import math
 import multiprocessing
+import os
+import sys
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cached_property
 from typing import Any
 
-from nmm.base.lazy_call import interrupts_wait
-
-with interrupts_wait():
-    import numba
-
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.extending import lower_builtin, register_jitable, type_callable
 
-from nmm.base.kernels import instructions
-from nmm.base.kernels.cache import cache_folder, works_marker
-from nmm.base.kernels.entries import PLAIN_OPTIONS, UNCACHED, Entry, Options, entry
+from nmm.base.kernels.cache import works_marker
+from nmm.base.kernels.declared import declare
+from nmm.base.kernels.entries import PLAIN_OPTIONS, Entry, Options, entry
+from nmm.base.kernels.signatures import (
+    Array,
+    Tuple,
+    Type,
+    boolean,
+    float64,
+    int64,
+    signature_of,
+    types_of,
+    void,
+)
+from nmm.base.lazy_call import interrupts_wait, lazy_call
+from nmm.base.machine import numba_version
 
 Plain = Callable[..., Any]
+_LOWERING = "nmm.base.kernels.lowering"
 
 #: qp_dot = G(qp) up: (qp, parameters, G, G_q) with G_q[i, j, k] = dG[i, j] / dqp[k]
-PLATFORM = types.void(types.float64[::1], types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1])
+PLATFORM = void(float64[::1], float64[::1], float64[:, ::1], float64[:, :, ::1])
 
 
 class Kernel:
@@ -56,7 +64,7 @@ class Kernel:
 
     def __init__(self, plain: Plain, signature: Any) -> None:
         self.plain = plain
-        self.signature = signature
+        self.signature = signature_of(signature)
 
     def __call__(self, *arguments: Any) -> Any:
         return self._call(*arguments)
@@ -73,27 +81,50 @@ class Kernel:
         if isinstance(made, Compiled):
             try:
                 made.compile(self.signature.args)
-            except numba.TypingError:
-                return _compiled_by_numba(numba.njit, self.plain)
+            except _typing_error():
+                return _by_numba("compiled_by_numba")(self.plain)
         return made
 
     @cached_property
     def address(self) -> int:
         """The address of its machine code, by which compiled programs call it."""
-        if numba.config.DISABLE_JIT:
+        if _disabled():
             address = id(self.plain)
         elif isinstance(self.compiled, Compiled):
             address = self.compiled.entry(self.signature.args).address
         else:
-            self._callback = _compiled_by_numba(functools.partial(numba.cfunc, self.signature), self.plain)
+            self._callback = _by_numba("callback")(self.plain, self.signature)
             address = int(self._callback.address)
             if problem() is None:
-                address = Compiled(_passing_on(self.signature, address)).entry(self.signature.args).address
+                call = _by_numba("passing_on")(self.signature, address)
+                address = Compiled(call).entry(self.signature.args).address
         _plain_by_address[address] = self.plain
         return address
 
 
 _plain_by_address: dict[int, Plain] = {}
+
+
+def _by_numba(name: str) -> Callable[..., Any]:
+    """A function of `lowering`, which imports numba."""
+    with interrupts_wait():
+        return lazy_call(f"{_LOWERING}:{name}")
+
+
+def _typing_error() -> Any:
+    """What numba raises for a function that cannot be compiled so; numba has been imported then."""
+    return lazy_call("numba:TypingError")
+
+
+def _disabled() -> bool:
+    """`numba.config.DISABLE_JIT`; numba is imported for it only where a file in this folder may set it."""
+    numba = sys.modules.get("numba")
+    if hasattr(numba, "config") or os.path.exists(".numba_config.yaml"):
+        return bool(importlib.import_module("numba").config.DISABLE_JIT)
+    try:
+        return bool(int(os.environ.get("NUMBA_DISABLE_JIT", "0")))
+    except ValueError:
+        return False
 
 
 def _expecting(kinds: tuple[Any, ...], call: Callable[..., Any]) -> Callable[..., Any]:
@@ -113,7 +144,7 @@ def _expecting(kinds: tuple[Any, ...], call: Callable[..., Any]) -> Callable[...
 
 def _check(kind: Any) -> Callable[[Any], bool]:
     """Whether a value from Python is of this type."""
-    if isinstance(kind, types.Array):
+    if isinstance(kind, Array):
         dtype, ndim = np.dtype(str(kind.dtype)), kind.ndim
 
         def same(value: Any) -> bool:
@@ -121,7 +152,7 @@ def _check(kind: Any) -> Callable[[Any], bool]:
             return fits and (kind.layout != "C" or bool(value.flags.c_contiguous))
 
         return same
-    if isinstance(kind, types.BaseTuple):
+    if isinstance(kind, Tuple):
         parts = [_check(part) for part in kind.types]
 
         def all_same(values: Any) -> bool:
@@ -129,24 +160,38 @@ def _check(kind: Any) -> Callable[[Any], bool]:
             return fits and all(part(value) for part, value in zip(parts, values, strict=True))
 
         return all_same
-    numbers = (int, np.integer) if isinstance(kind, types.Integer) else (int, float, np.number, np.bool_)
+    numbers = (int, np.integer) if kind is int64 else (int, float, np.number, np.bool_)
     return lambda value: isinstance(value, numbers)
 
 
-#: The numba types of arrays, by what determines them; to ask numba takes several µs.
-_array_types: dict[tuple[Any, ...], Any] = {}
-_number_types = {float: types.float64, int: types.int64, bool: types.boolean, np.float64: types.float64}
+#: The types of arrays, by what determines them.
+_array_types: dict[tuple[Any, ...], Type] = {}
+_NUMBERS: dict[type, Type] = {float: float64, int: int64, bool: boolean}
+_NUMBERS |= {np.float64: float64, np.int64: int64, np.bool_: boolean}
 
 
-def _type_of(value: Any) -> Any:
-    """`numba.typeof`, faster."""
-    if type(value) is np.ndarray:
+def _type_of(value: Any) -> Type:
+    """The type of an argument from Python."""
+    kind = type(value)
+    if kind is np.ndarray:
         flags = value.flags
         key = value.dtype, value.ndim, flags.c_contiguous, flags.f_contiguous, flags.writeable
         if key not in _array_types:
-            _array_types[key] = numba.typeof(value)
+            _array_types[key] = _type_of_array(value)
         return _array_types[key]
-    return _number_types.get(type(value)) or numba.typeof(value)
+    if kind in _NUMBERS:
+        return _NUMBERS[kind]
+    if isinstance(value, tuple):
+        return Tuple(tuple(map(_type_of, value)), kind if kind is not tuple else None)
+    return void if value is None else _by_numba("type_of")(value)
+
+
+def _type_of_array(value: Any) -> Type:
+    number = _NUMBERS.get(value.dtype.type) if value.dtype.isnative else None
+    if number is None:
+        return _by_numba("type_of")(value)
+    layout = "C" if value.flags.c_contiguous else "F" if value.flags.f_contiguous else "A"
+    return Array(number, value.ndim, layout, bool(value.flags.writeable))
 
 
 class Compiled:
@@ -160,17 +205,17 @@ class Compiled:
         functools.update_wrapper(self, function)
         self.py_func = function
         self._options = options
-        self.entries: dict[tuple[Any, ...], Entry] = {}
-        _into_callers(self, function, inlined)
+        self.entries: dict[tuple[Type, ...], Entry] = {}
+        declare(f"{_LOWERING}:into_callers", self, function, inlined)
 
-    def entry(self, arguments: tuple[Any, ...]) -> Entry:
+    def entry(self, arguments: tuple[Type, ...]) -> Entry:
         """The machine code for these types of arguments, compiled or from the cache."""
         if arguments not in self.entries:
             self.entries[arguments] = entry(self.py_func, arguments, self._options)
         return self.entries[arguments]
 
     def compile(self, arguments: tuple[Any, ...]) -> None:
-        self.entry(tuple(arguments))
+        self.entry(types_of(tuple(arguments)))
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         if named or len(arguments) != self.py_func.__code__.co_argcount:
@@ -178,35 +223,6 @@ class Compiled:
             bound.apply_defaults()
             arguments = bound.args
         return self.entry(tuple(map(_type_of, arguments))).call(*arguments)
-
-
-def _into_callers(key: Any, function: Plain, inlined: bool = False) -> None:
-    """Have `key` in compiled code call the function, whose instructions become its callers' own."""
-    defaults, count = function.__defaults__ or (), function.__code__.co_argcount
-    parts: dict[tuple[Any, ...], Any] = {}
-
-    def after(passed: int) -> tuple[Any, ...]:
-        """The defaults of the arguments after so many."""
-        return tuple(defaults[len(defaults) - count + passed :])
-
-    def part(arguments: tuple[Any, ...]) -> Any:
-        if arguments not in parts:
-            whole = (*arguments, *map(numba.typeof, after(len(arguments))))
-            parts[arguments] = instructions.written(function, whole, inlined)
-        return parts[arguments]
-
-    def type_of(*arguments: Any) -> Any:
-        signature = part(tuple(map(types.unliteral, arguments))).signature
-        return signature.return_type(*signature.args[: len(arguments)])
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        made = part(signature.args)
-        for kind, value in zip(made.signature.args[len(values) :], after(len(values)), strict=True):
-            values = [*values, context.get_constant(kind, value)]
-        return instructions.call(context, builder, made, values)
-
-    type_of.__signature__ = inspect.signature(function)  # type: ignore[attr-defined]
-    generated_in_callers(key, type_of, generate, (types.VarArg(types.Any),))
 
 
 def compiled(
@@ -218,56 +234,11 @@ def compiled(
     compiled code raises no exception. Arrays are neither created (but see `scratch`) nor returned, as
     counting references to them would take half of a control step. The options are those below.
     """
-    if numba.config.DISABLE_JIT:
+    if _disabled():
         return function
     if problem() is not None:
-        return _compiled_by_numba(functools.partial(numba.njit, nogil=nogil), function)
+        return _by_numba("compiled_by_numba")(function, nogil)
     return Compiled(function, inlined, Options(nogil, vectorized))
-
-
-def _compiled_by_numba(decorator: Callable[..., Any], function: Plain) -> Any:
-    """A function made by numba's own decorator, cached in nmm's folder where that is writable."""
-    before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(cache_folder())
-    try:
-        return decorator(cache=True, error_model="numpy")(function)
-    except RuntimeError:  # it cannot be cached
-        return decorator(error_model="numpy")(function)
-    finally:
-        numba.config.CACHE_DIR = before
-
-
-#: What the trial below calls.
-_part: Any = None
-_through: Any = None
-
-
-def _root(x: float) -> float:
-    if x < 0.0:
-        raise ValueError("below zero")
-    return math.sqrt(x)
-
-
-def _both(address: int, x: float) -> float:
-    return float(_through(address, x) + _part(x))
-
-
-def _trial() -> str | None:
-    """What does not work of `instructions`, or None."""
-    global _part, _through
-    signature = types.float64(types.float64)
-    try:
-        _part, _through = Compiled(_root, options=UNCACHED), caller(signature)
-        root, both = _part, Compiled(_both, options=UNCACHED)
-        if root(9.0) != 3.0:
-            return "a function called from Python answers wrongly"
-        if both(root.entry(signature.args).address, 4.0) != 4.0:
-            return "a function with parts answers wrongly"
-        with suppress(RuntimeError):
-            both(root.entry(signature.args).address, -1.0)
-            return "errors are lost"
-    except Exception as error:  # other internals may raise anything
-        return f"{type(error).__name__}: {(str(error).splitlines() or [''])[0]}"
-    return None
 
 
 @functools.cache
@@ -276,18 +247,21 @@ def problem() -> str | None:
     folder.
     """
     works = works_marker()
-    if instructions.missing is None and not works.is_dir():
-        instructions.missing = _trial()
-        if instructions.missing is None:
-            with suppress(OSError):  # then it is tried again
-                works.mkdir(parents=True)
-    if instructions.missing is not None and multiprocessing.parent_process() is None:
+    if works.is_dir():
+        return None
+    with interrupts_wait():
+        trial = lazy_call("nmm.base.kernels.trial:fault")
+    fault: str | None = trial()
+    if fault is None:
+        with suppress(OSError):  # then it is tried again
+            works.mkdir(parents=True)
+    elif multiprocessing.parent_process() is None:
         logging.getLogger("nmm").warning(
             "numba %s: %s; nmm compiles by numba's njit alone: the same numbers, later and more slowly",
-            numba.__version__,
-            instructions.missing,
+            numba_version(),
+            fault,
         )
-    return instructions.missing
+    return fault
 
 
 #: Decorator for long-running functions, beside which other threads should run.
@@ -302,11 +276,11 @@ inlined_in_callers = functools.partial(compiled, inlined=True)
 
 def inlined(function: Plain) -> Plain:
     """Decorator for helpers of compiled functions that are plain Python when called from Python."""
-    if numba.config.DISABLE_JIT:
+    if _disabled():
         return function
     if problem() is not None:
-        return register_jitable(function)
-    _into_callers(function, function)
+        return _by_numba("register_jitable")(function)
+    declare(f"{_LOWERING}:into_callers", function, function)
     return function
 
 
@@ -314,9 +288,9 @@ def checked_by_caller(function: Any, signature: Any) -> Callable[..., Any]:
     """A compiled function that skips the check of its arguments, which saves a third of a µs; arguments that
     do not have this signature are misread or crash the process."""
     if isinstance(function, Compiled):
-        return function.entry(signature.args).call
+        return function.entry(signature_of(signature).args).call
     if hasattr(function, "compile"):  # numba's own
-        function.compile(signature.args)
+        function.compile(_by_numba("to_numba")(signature_of(signature)).args)
     return function
 
 
@@ -339,14 +313,6 @@ def view(memory: Any, first: int, shape: tuple[int, ...]) -> Any:
     return memory.reshape(-1)[first : first + math.prod(shape)].reshape(shape)
 
 
-def generated_in_callers(function: Any, type_of: Any, generate: Any, *kinds: tuple[Any, ...]) -> None:
-    """Give a plain function a compiled form, generated in its callers, that may return memory on their stack;
-    type_of maps the arguments' types to a type or a signature, kinds are the types for which it is made."""
-    type_callable(function)(lambda context: type_of)
-    for arguments in kinds:
-        lower_builtin(function, *arguments)(generate)
-
-
 def scratch(extents: Any) -> Any:
     """Memory for a kernel while it runs: `np.empty(extents)`, on the stack when compiled.
 
@@ -360,49 +326,9 @@ def integer_scratch(extent: int) -> Any:
     return np.empty(extent, dtype=np.int64)
 
 
-def _on_the_stack(function: Callable[..., Any], number: Any) -> None:
-    def type_of(extents: Any) -> Any:
-        return types.Array(number, getattr(extents, "count", 1), "C")
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        several = isinstance(signature.args[0], types.UniTuple)
-        extents = cgutils.unpack_tuple(builder, values[0]) if several else [values[0]]
-        size = functools.reduce(builder.mul, extents)
-        data = builder.alloca(context.get_value_type(number), size=size)
-        return array_at(context, builder, signature.return_type, data, extents)
-
-    generated_in_callers(function, type_of, generate, (types.Integer,), (types.UniTuple,))
-
-
-_on_the_stack(scratch, types.float64)
-_on_the_stack(integer_scratch, types.int64)
-
-
-def array_at(context: Any, builder: Any, kind: Any, data: Any, extents: Any) -> Any:
-    """For intrinsics: the contiguous array at a pointer, without reference counting."""
-    itemsize = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(kind.dtype)))
-    strides: list[Any] = []
-    stride = itemsize
-    for extent in reversed(extents):
-        strides.insert(0, stride)
-        stride = builder.mul(stride, extent)
-    array = context.make_array(kind)(context, builder)
-    context.populate_array(array, data=data, shape=extents, strides=strides, itemsize=itemsize, meminfo=None)
-    return array._getvalue()
-
-
-def _type_of_view(memory: Any, first: Any, shape: Any) -> Any:
-    extents = types.UniTuple(types.int64, len(shape))
-    return types.Array(memory.dtype, len(shape), "C")(memory, types.int64, extents)
-
-
-def _generate_view(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-    owner = context.make_array(signature.args[0])(context, builder, values[0])
-    extents = cgutils.unpack_tuple(builder, values[2])
-    return array_at(context, builder, signature.return_type, builder.gep(owner.data, [values[1]]), extents)
-
-
-generated_in_callers(view, _type_of_view, _generate_view, (types.Array, types.int64, types.UniTuple))
+declare(f"{_LOWERING}:on_the_stack", scratch, float64)
+declare(f"{_LOWERING}:on_the_stack", integer_scratch, int64)
+declare(f"{_LOWERING}:as_view", view)
 
 
 def caller(signature: Any) -> Callable[..., Any]:
@@ -411,50 +337,8 @@ def caller(signature: Any) -> Callable[..., Any]:
     def call(address: int, *arguments: Any) -> Any:
         return _plain_by_address[address](*arguments)
 
-    def generate(context: Any, builder: Any, _: Any, values: Any) -> Any:
-        if instructions.missing is None:
-            return instructions.call_address(context, builder, signature, values[0], values[1:])
-        return _call_by_c(context, builder, signature, values[0], values[1:])
-
-    _generated_for(call, signature, generate)
+    declare(f"{_LOWERING}:by_address", call, signature_of(signature))
     return call
-
-
-def _generated_for(function: Any, signature: Any, generate: Any) -> None:
-    """The compiled form of a function (address, *arguments), the arguments being those of a signature."""
-
-    def type_of(*_: Any) -> Any:
-        return signature.return_type(types.int64, *signature.args)
-
-    names = ("address", *(f"argument_{k}" for k in range(len(signature.args))))
-    positional = inspect.Parameter.POSITIONAL_OR_KEYWORD
-    type_of.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-        [inspect.Parameter(name, positional) for name in names]
-    )
-    generated_in_callers(function, type_of, generate, (types.VarArg(types.Any),))
-
-
-def _call_by_c(context: Any, builder: Any, signature: Any, address: Any, values: Any) -> Any:
-    """A call of what `numba.cfunc` compiled."""
-    kinds = [context.get_value_type(kind) for kind in signature.args]
-    pointer_type = ir.FunctionType(context.get_value_type(signature.return_type), kinds).as_pointer()
-    return builder.call(builder.inttoptr(address, pointer_type), values)
-
-
-def _passing_on(signature: Any, address: int) -> Plain:
-    """A function to compile that calls what `numba.cfunc` compiled."""
-
-    def call(address: int, *arguments: Any) -> Any:
-        return _plain_by_address[address](*arguments)
-
-    def generate(context: Any, builder: Any, _: Any, values: Any) -> Any:
-        return _call_by_c(context, builder, signature, values[0], values[1:])
-
-    _generated_for(call, signature, generate)
-    names = ", ".join(f"argument_{k}" for k in range(len(signature.args)))
-    scope = {"call": call, "address": address}
-    exec(f"def passing_on({names}):\n    return call(address, {names})", scope)
-    return scope["passing_on"]  # type: ignore[return-value]
 
 
 call_platform = caller(PLATFORM)

@@ -1,13 +1,11 @@
 """How Python calls machine code: a C function that reads its arguments from Python's objects.
 
 Arguments are arrays, numbers and tuples of these, as a signature of numba says; they are not checked. By
-Python's C interface (`METH_FASTCALL`, `PyCFunction_NewEx`) and numpy's (`PyArrayObject`): a call takes some
-50 ns, where numba's dispatcher takes 500.
+Python's C interface (`METH_FASTCALL`) and numpy's (`PyArrayObject`).
 """
 
 from __future__ import annotations
 
-import ctypes
 from typing import Any
 
 from llvmlite import ir
@@ -18,7 +16,6 @@ _INT, _LONG = ir.IntType(32), ir.IntType(64)
 _POINTER = ir.IntType(8).as_pointer()
 #: What precedes the fields data, nd, dimensions, strides of an array object, bytes.
 _HEAD = object.__basicsize__
-_METH_FASTCALL = 0x80
 
 
 def write_door(name: str, nogil: bool, context: Any, module: Any, signature: Any, call: Any) -> None:
@@ -133,24 +130,3 @@ class _Door:
         if isinstance(kind, types.Integer):
             return self.call(_POINTER, "PyLong_FromLongLong", context.cast(builder, value, kind, types.int64))
         raise NotImplementedError(f"{kind} to Python")
-
-
-class _Method(ctypes.Structure):
-    _fields_ = (
-        ("name", ctypes.c_char_p),
-        ("address", ctypes.c_void_p),
-        ("flags", ctypes.c_int),
-        ("doc", ctypes.c_char_p),
-    )
-
-
-_new_function = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p)(
-    ("PyCFunction_NewEx", ctypes.pythonapi)
-)
-_methods: list[_Method] = []
-
-
-def python_function(name: str, address: int) -> Any:
-    """The function that Python calls at an address."""
-    _methods.append(_Method(name.encode(), address, _METH_FASTCALL, None))  # as long as the function
-    return _new_function(ctypes.addressof(_methods[-1]), RuntimeError, None)

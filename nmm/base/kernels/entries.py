@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import pickle
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from nmm.base import disk_cache
-from nmm.base.kernels import instructions
 from nmm.base.kernels.cache import file_of, key_of, log_unwritable_once, tell_of_the_first
-from nmm.base.kernels.doors import python_function, write_door
-from nmm.base.kernels.machine_code import load, object_file
+from nmm.base.kernels.machine_code import load
+from nmm.base.kernels.python_calls import python_function
+from nmm.base.kernels.signatures import Type
+from nmm.base.lazy_call import lazy_call
 
 
 class Options(NamedTuple):
@@ -39,7 +39,7 @@ class Entry(NamedTuple):
     read: bool
 
 
-def entry(function: Any, arguments: tuple[Any, ...], options: Options) -> Entry:
+def entry(function: Any, arguments: tuple[Type, ...], options: Options) -> Entry:
     """A function's machine code for these types of arguments, from the cache or compiled."""
     key = key_of(function, arguments, options) if options.cached else None
     path = None if key is None else file_of(function, key)
@@ -47,7 +47,8 @@ def entry(function: Any, arguments: tuple[Any, ...], options: Options) -> Entry:
     if stored is None:
         if options.cached:
             tell_of_the_first()
-        names, code, lasting = _compiled(function, arguments, options)
+        compile_whole = lazy_call("nmm.base.kernels.wholes:compile_whole")
+        names, code, lasting = compile_whole(function, arguments, options.nogil, options.vectorized)
         if path is not None and lasting:
             try:
                 disk_cache.write(path, pickle.dumps((key, names, code)))
@@ -68,21 +69,3 @@ def _stored(path: Path, key: object) -> tuple[tuple[str, str], bytes] | None:
             if stored_key == key:
                 return names, code
     return None
-
-
-def _compiled(
-    function: Any, arguments: tuple[Any, ...], options: Options
-) -> tuple[tuple[str, str], bytes, bool]:
-    """The names of the function and of its door, the object file, and whether other processes can use it."""
-    door = f"nmm_door_{function.__name__}"
-    module, name = instructions.whole(function, arguments, partial(write_door, door, options.nogil))
-    code = object_file(module, (name, door), options.vectorized)
-    lasting = not any(map(_only_here, (*module.global_variables, *module.functions)))
-    return (name, door), code, lasting
-
-
-def _only_here(part: Any) -> bool:
-    """Whether other processes lack it: functions that numba registers, and addresses in this process."""
-    if part.is_declaration:
-        return "numba" in part.name or part.name.startswith("NRT_")
-    return bool(part.name.startswith("numba.dynamic.globals"))

@@ -21,7 +21,7 @@ It is laid out from an example with the initial values, and read by name, compil
 1. A record's header begins at `integers[place]`: for each array [its start in its block, its extents...], for
    each `int` the number, for a record its header. `header_length` does not depend on shapes, so compiled code
    may hold places as constants. A list of records is an IntegerVector of their places.
-2. `views` costs nothing in compiled code, where a record is the blocks and its place (`LaidOutRecord`), and a
+2. `views` costs nothing in compiled code, where a record is the blocks and its place (`RecordPlace`), and a
    field is read as a pointer and extents, without checks of bounds or reference counting. The caller of
    compiled code holds the blocks while it runs, and changes no header.
 3. Numbers lie in the order of records and of their fields, except those of 5; only this file relies on it.
@@ -39,16 +39,13 @@ from functools import cache
 from typing import Annotated, Any, NamedTuple, TypeAlias, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
-from numba import types
-from numba.core import cgutils
-from numba.core.datamodel import models
-from numba.core.typeconv import Conversion
-from numba.core.typing.templates import AttributeTemplate, infer_getattr
-from numba.extending import lower_cast, lower_getattr_generic, register_model
 
 from nmm.base.arrays import Array, Integers
-from nmm.base.kernels.compiled import array_at, compiled, generated_in_callers, view
+from nmm.base.kernels.compiled import compiled, view
+from nmm.base.kernels.declared import declare
 from nmm.base.kernels.linear_algebra import copied
+from nmm.base.kernels.signatures import Array as ArrayType
+from nmm.base.kernels.signatures import Tuple, float64, int64
 
 
 class Kind(NamedTuple):
@@ -83,8 +80,8 @@ class Blocks(NamedTuple):
     floats: Array
 
 
-#: The numba type of `Blocks`.
-BLOCKS = types.NamedTuple((types.int64[::1], types.float64[::1]), Blocks)
+#: The type of `Blocks` in signatures.
+BLOCKS = Tuple((int64[::1], float64[::1]), Blocks)
 
 
 class Memory:
@@ -157,39 +154,38 @@ def put_back(integers: Integers, floats: Array, own_integers: Integers, own: Arr
 def views(record: type[R], integers: Integers, floats: Array, place: int) -> R:
     """The record whose header begins at `integers[place]`, its arrays as views of the blocks."""
     parts: list[Any] = []
-    for field in _fields(record).values():
+    for field in fields_of(record).values():
         if isinstance(field, Kind):
             block: Any = integers if field.dtype is np.int64 else floats
             extents = tuple(int(extent) for extent in integers[place + 1 : place + 1 + field.ndim])
             parts.append(view(block, int(integers[place]), extents))
         else:
             parts.append(int(integers[place]) if field is int else views(field, integers, floats, place))
-        place += _length(field)
+        place += length_of(field)
     return record(*parts)
 
 
 @cache
 def header_length(record: type) -> int:
     """The number of integers in such a record's header."""
-    return sum(map(_length, _fields(record).values()))
-
-
-def record_type(record: type) -> Any:
-    """The numba type of such a record."""
-    return types.BaseTuple.from_types(
-        [_type_of(one, record_type) for one in _fields(record).values()], record
-    )
-
-
-def _type_of(field: Any, of_record: Callable[[type], Any]) -> Any:
-    """The numba type of a field; `of_record` makes that of a nested record."""
-    if isinstance(field, Kind):
-        return types.Array(types.int64 if field.dtype is np.int64 else types.float64, field.ndim, "C")
-    return {int: types.int64, float: types.float64}.get(field) or of_record(field)
+    return sum(map(length_of, fields_of(record).values()))
 
 
 @cache
-def _fields(record: type) -> dict[str, Any]:
+def record_type(record: type) -> Tuple:
+    """The type of such a record in signatures."""
+    return Tuple(tuple(type_of_field(field, record_type) for field in fields_of(record).values()), record)
+
+
+def type_of_field(field: Any, of_record: Callable[[type], Any]) -> Any:
+    """The type of a field; `of_record` makes that of a nested record."""
+    if isinstance(field, Kind):
+        return ArrayType(int64 if field.dtype is np.int64 else float64, field.ndim, "C")
+    return {int: int64, float: float64}.get(field) or of_record(field)
+
+
+@cache
+def fields_of(record: type) -> dict[str, Any]:
     """The kinds of the fields by name, in order: a `Kind`, `int`, `float` or another record."""
     found: dict[str, Any] = {}
     for name, hint in get_type_hints(record, include_extras=True).items():
@@ -202,7 +198,7 @@ def _fields(record: type) -> dict[str, Any]:
     return found
 
 
-def _length(field: Any) -> int:
+def length_of(field: Any) -> int:
     if field is float:
         raise TypeError("a float of a record is handed over, not laid out: expected a Cell")
     if isinstance(field, Kind):
@@ -212,7 +208,7 @@ def _length(field: Any) -> int:
 
 def _flat(record: type, values: tuple[Any, ...]) -> Iterator[tuple[Any, Any]]:
     """The fields of nested records in order, with their values."""
-    for (name, field), value in zip(_fields(record).items(), values, strict=True):
+    for (name, field), value in zip(fields_of(record).items(), values, strict=True):
         if field is not int and not isinstance(field, Kind):
             yield from _flat(field, value)
             continue
@@ -221,92 +217,4 @@ def _flat(record: type, values: tuple[Any, ...]) -> Iterator[tuple[Any, Any]]:
         yield field, value
 
 
-class LaidOutRecord(types.Type):
-    """A record in compiled code: both blocks and its place. Fields are looked up when read, as a tuple of all
-    arrays would pass hundreds of numbers at each call."""
-
-    def __init__(self, record: type) -> None:
-        self.record = record
-        super().__init__(f"LaidOutRecord({record.__module__}.{record.__qualname__})")
-
-    def can_convert_to(self, _: Any, other: Any) -> Any:
-        return Conversion.safe if other == record_type(self.record) else None
-
-
-@register_model(LaidOutRecord)
-class _LaidOutModel(models.StructModel):
-    def __init__(self, manager: Any, kind: Any) -> None:
-        members = [
-            ("integers", types.CPointer(types.int64)),
-            ("floats", types.CPointer(types.float64)),
-            ("place", types.int64),
-        ]
-        super().__init__(manager, kind, members)
-
-
-@infer_getattr
-class _FieldTypes(AttributeTemplate):
-    key = LaidOutRecord
-
-    def generic_resolve(self, kind: Any, name: str) -> Any:
-        """The type of a field; None for an unknown name."""
-        field = _fields(kind.record).get(name)
-        return None if field is None else _type_of(field, LaidOutRecord)
-
-
-@lower_getattr_generic(LaidOutRecord)
-def _generate_field(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
-    """Instructions that read one field."""
-    blocks = cgutils.create_struct_proxy(kind)(context, builder, value)
-    fields, index = _fields(kind.record), kind.record._fields.index(name)
-    field, before = fields[name], sum(map(_length, [*fields.values()][:index]))
-    place = builder.add(blocks.place, context.get_constant(types.int64, before))
-
-    def read(k: int) -> Any:
-        at = builder.add(place, context.get_constant(types.int64, k))
-        loaded = builder.load(builder.gep(blocks.integers, [at]))
-        # Headers are constant while compiled code runs, so LLVM need not reread them after each write.
-        loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
-        return loaded
-
-    if isinstance(field, Kind):
-        block = blocks.integers if field.dtype is np.int64 else blocks.floats
-        extents = [read(k + 1) for k in range(field.ndim)]
-        return array_at(
-            context, builder, _type_of(field, LaidOutRecord), builder.gep(block, [read(0)]), extents
-        )
-    if field is int:
-        return read(0)
-    part = cgutils.create_struct_proxy(LaidOutRecord(field))(context, builder)
-    part.integers, part.floats, part.place = blocks.integers, blocks.floats, place
-    return part._getvalue()
-
-
-@lower_cast(LaidOutRecord, types.BaseTuple)
-def _generate_tuple(context: Any, builder: Any, kind: Any, whole: Any, value: Any) -> Any:
-    """The record as a tuple, for kernels that are called by their addresses."""
-    parts = []
-    for name, part in zip(kind.record._fields, whole.types, strict=True):
-        read = _generate_field(context, builder, kind, value, name)
-        inner = _FieldTypes(None).generic_resolve(kind, name)
-        parts.append(_generate_tuple(context, builder, inner, part, read) if inner != part else read)
-    return context.make_tuple(builder, whole, parts)
-
-
-def _type_of_views(record: Any, integers: Any, floats: Any, place: Any) -> Any:
-    return LaidOutRecord(record.instance_class)(record, integers, floats, types.int64)
-
-
-def _generate_views(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-    made = cgutils.create_struct_proxy(signature.return_type)(context, builder)
-    made.integers, made.floats = (
-        context.make_array(kind)(context, builder, value).data
-        for kind, value in zip(signature.args[1:3], values[1:3], strict=True)
-    )
-    made.place = values[3]
-    return made._getvalue()
-
-
-generated_in_callers(
-    views, _type_of_views, _generate_views, (types.NamedTupleClass, types.Array, types.Array, types.int64)
-)
+declare("nmm.base.kernels.record_lowering:as_views", views)

@@ -14,10 +14,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from numba import types
-
 from nmm.base.kernels.compiled import caller
 from nmm.base.kernels.record_layout import IntegerVector, Matrices, Matrix, Tensors, Vector, record_type
+from nmm.base.kernels.signatures import float64, void
 
 
 class At(NamedTuple):
@@ -60,6 +59,6 @@ class Rows(NamedTuple):
 
 
 #: y = phi(t, q) with its partial derivatives: (at, frames, numbers, rows), the numbers being the stage's own.
-FUNCTION = types.void(record_type(At), record_type(Frames), types.float64[::1], record_type(Rows))
+FUNCTION = void(record_type(At), record_type(Frames), float64[::1], record_type(Rows))
 
 call_function = caller(FUNCTION)

@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from numba import types
 
 from nmm.base.arrays import Array
 from nmm.base.cores import Work, over_cores
@@ -16,6 +15,7 @@ from nmm.base.kernels.compiled import (
     view,
 )
 from nmm.base.kernels.linear_algebra import EPSILON, MOST_SWEEPS, orthonormal_rows
+from nmm.base.kernels.signatures import float64, void
 
 #: Matrices per compiled call, which cannot be interrupted.
 AT_ONCE = 128
@@ -115,7 +115,7 @@ def write_roots(squares: Array, p: int, found: Array) -> None:
         found[place] = value
 
 
-WRITE_SPECTRA = types.void(types.float64[:, :, ::1], types.float64[:, ::1])
+WRITE_SPECTRA = void(float64[:, :, ::1], float64[:, ::1])
 
 
 @vectorized_without_gil

@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import types
 
 from nmm.base.arrays import Array, Integers
 from nmm.base.kernels.compiled import call_platform, clear, compiled, view
@@ -27,6 +26,7 @@ from nmm.base.kernels.record_layout import (
     views,
 )
 from nmm.base.kernels.records import At, Frames, Rows, call_function
+from nmm.base.kernels.signatures import float64, int64, void
 from nmm.control.functions.function import Callback, Evaluation, Function, Renewal, Stage
 from nmm.model.robots.configuration import Configuration, kinematics_updater
 from nmm.model.robots.joint_table import frame_table
@@ -125,8 +125,8 @@ def run_stages(t: float, q: Array, integers: Integers, floats: Array, b: Buffers
             call_function(stage.kernel, at, frames, stage.numbers, rows)
 
 
-_TABLES, _TENSORS = types.float64[:, :, ::1], types.float64[:, :, :, ::1]
-PLACE = types.void(BLOCKS, types.int64, types.float64[::1], _TABLES, _TABLES, _TENSORS)
+_TABLES, _TENSORS = float64[:, :, ::1], float64[:, :, :, ::1]
+PLACE = void(BLOCKS, int64, float64[::1], _TABLES, _TABLES, _TENSORS)
 
 
 @compiled

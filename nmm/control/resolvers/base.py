@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeAlias, get_args
 
 import numpy as np
-from numba import types
 
 from nmm.base.arrays import Array, Integers, array
 from nmm.base.errors import InputError, expect, expect_known
 from nmm.base.findings import Finding
 from nmm.base.kernels.compiled import Kernel, caller, compiled
-from nmm.base.kernels.record_layout import LaidOutRecord, Memory, header_length, views
+from nmm.base.kernels.record_layout import Memory, header_length, views
+from nmm.base.kernels.signatures import RecordPlace, float64, int64, void
 from nmm.control.resolvers.answer import Answer, AnswerArrays, unanswered
 from nmm.control.resolvers.limit_check import keep_limits
 from nmm.control.resolvers.problem import Dimensions, Problem
@@ -23,10 +23,8 @@ from nmm.model.robots.input_weights import by_name
 
 #: Signature of a resolver's kernel: `ProblemArrays`, the numbers and options of its `Setup`, the integers of
 #: its `State`, and the `AnswerArrays` that it writes.
-_floats, _integers = types.float64[::1], types.int64[::1]
-RESOLVER = types.void(
-    LaidOutRecord(ProblemArrays), _floats, _integers, _integers, LaidOutRecord(AnswerArrays)
-)
+_floats, _integers = float64[::1], int64[::1]
+RESOLVER = void(RecordPlace(ProblemArrays), _floats, _integers, _integers, RecordPlace(AnswerArrays))
 
 call_resolver = caller(RESOLVER)
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 
-from numba import types
-
 from nmm.base.arrays import Array
 from nmm.base.kernels.active_set import FEASIBLE
 from nmm.base.kernels.compiled import caller, clear, compiled, scratch, view
 from nmm.base.kernels.linear_algebra import copied, dot, times_matrix
 from nmm.base.kernels.record_layout import record_type
+from nmm.base.kernels.signatures import float64, void
 from nmm.control.resolvers.answer import NOT_FINITE, SINGULAR_J, AnswerArrays
 from nmm.control.resolvers.problem_arrays import ProblemArrays
 
@@ -18,7 +17,7 @@ from nmm.control.resolvers.problem_arrays import ProblemArrays
 LEFT = 1e-9
 
 #: Signature of `limit`: the problem, the inverse of the resolver's metric, and the answer that it changes.
-LIMIT = types.void(record_type(ProblemArrays), types.float64[:, ::1], record_type(AnswerArrays))
+LIMIT = void(record_type(ProblemArrays), float64[:, ::1], record_type(AnswerArrays))
 
 call_limit = caller(LIMIT)
 

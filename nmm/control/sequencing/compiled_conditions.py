@@ -5,11 +5,11 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
 from nmm.base.arrays import Array, Flags, Integers
 from nmm.base.kernels.compiled import compiled, compiled_without_gil, scratch, view
 from nmm.base.kernels.record_layout import IntegerMatrix, IntegerVector, Matrix, record_type, views
+from nmm.base.kernels.signatures import boolean, float64, int64, void
 from nmm.control.functions.program import LaidOut, run_program
 from nmm.control.functions.tasks.conditions import After, Between, Condition
 from nmm.control.functions.tasks.task import Task
@@ -44,18 +44,16 @@ class Conditions(NamedTuple):
     bounds: Matrix
 
 
-_FLAT, _CONDITIONS = types.float64[::1], record_type(Conditions)
+_FLAT, _CONDITIONS = float64[::1], record_type(Conditions)
 
 #: t, q (n,), the program's blocks, the conditions, active tasks, the memory, and the memory to write.
-LOOK = types.void(
-    types.float64, _FLAT, types.int64[::1], _FLAT, _CONDITIONS, types.boolean[::1], _FLAT, _FLAT
-)
+LOOK = void(float64, _FLAT, int64[::1], _FLAT, _CONDITIONS, boolean[::1], _FLAT, _FLAT)
 
 #: times (N,), q (N, n), the program's blocks, the conditions, tasks that are active and over, the memory,
 #: and the previous memory to write.
-WATCH = types.int64(
-    *(_FLAT, types.Array(types.float64, 2, "C"), types.int64[::1], _FLAT),
-    *(_CONDITIONS, types.boolean[::1], types.boolean[::1], _FLAT, _FLAT),
+WATCH = int64(
+    *(_FLAT, float64[:, ::1], int64[::1], _FLAT),
+    *(_CONDITIONS, boolean[::1], boolean[::1], _FLAT, _FLAT),
 )
 
 

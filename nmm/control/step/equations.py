@@ -8,8 +8,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from numba import types
-
 from nmm.base.arrays import Array, Integers
 from nmm.base.kernels.compiled import caller, compiled, kernel, scratch
 from nmm.base.kernels.linear_algebra import dot, residual_norm
@@ -21,6 +19,7 @@ from nmm.base.kernels.record_layout import (
     Vector,
     views,
 )
+from nmm.base.kernels.signatures import boolean, float64, int64, void
 from nmm.base.kernels.velocity_map import to_coordinates, to_inputs
 from nmm.control.functions.program import BESIDE, Buffers, LaidOut, run_program
 from nmm.control.limits.bounds import SAMPLE, Clearance, LimitNumbers, gathers_speed
@@ -94,19 +93,19 @@ class ControlStep(NamedTuple):
 
 
 #: The signature of `step`.
-STEP = types.float64(types.float64, types.float64[::1], types.int64[::1], types.float64[::1])
+STEP = float64(float64, float64[::1], int64[::1], float64[::1])
 
 call_step = caller(STEP)
 
 #: The signature of kernels that write bounds for the resolver: q, and the blocks.
-BOUNDS = types.void(types.float64[::1], types.int64[::1], types.float64[::1])
+BOUNDS = void(float64[::1], int64[::1], float64[::1])
 
 call_bounds = caller(BOUNDS)
 
 #: The signatures of `resolve`, `watch_error` and `drive_inputs`; `replace_inputs` has BOUNDS.
-ANSWER = types.float64(types.float64[::1], types.int64[::1], types.float64[::1])
-WATCH = types.boolean(types.int64[::1], types.float64[::1])
-DRIVE = types.void(types.int64[::1], types.float64[::1])
+ANSWER = float64(float64[::1], int64[::1], float64[::1])
+WATCH = boolean(int64[::1], float64[::1])
+DRIVE = void(int64[::1], float64[::1])
 
 #: In place of the row of a computed error: the error is r_d - r; that of an angle is wrapped.
 PLAIN, WRAPPED = -1, -2

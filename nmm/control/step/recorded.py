@@ -6,12 +6,12 @@ import math
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numba import types
 
 from nmm.base.arrays import Array, Integers
 from nmm.base.kernels.compiled import call_platform, checked_by_caller, clear, compiled, scratch, view
 from nmm.base.kernels.linear_algebra import dot
 from nmm.base.kernels.record_layout import Blocks, Kind, record_type, views
+from nmm.base.kernels.signatures import float64, int64, void
 from nmm.control.functions.program import BESIDE, LaidOut
 from nmm.control.resolvers.answer import FALLBACK, added_residual
 from nmm.control.resolvers.partitions import COLUMNS
@@ -39,9 +39,9 @@ def room(count: int, n: int, m: int, s: int, levels: int, limited: int) -> Recor
     return Recorded._make(one.room(sizes) for one in NOTED)
 
 
-NOTE_SAMPLE = types.void(
-    *(types.int64[::1], types.float64[::1], types.float64[::1]),
-    *(types.int64, types.float64, types.int64, record_type(Recorded)),
+NOTE_SAMPLE = void(
+    *(int64[::1], float64[::1], float64[::1]),
+    *(int64, float64, int64, record_type(Recorded)),
 )
 
 
@@ -86,9 +86,9 @@ def note_sample(
         found.limited[k, i] = b.value[e.limits.rows[i - w]]
 
 
-NOTE_HELD = types.void(
-    *(types.int64[::1], types.float64[::1], types.float64[::1], types.float64[::1]),
-    *(types.int64, record_type(Recorded)),
+NOTE_HELD = void(
+    *(int64[::1], float64[::1], float64[::1], float64[::1]),
+    *(int64, record_type(Recorded)),
 )
 
 

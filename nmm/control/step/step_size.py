@@ -15,7 +15,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
 from nmm.base.arrays import Array, Integers
 from nmm.base.errors import InputError
@@ -32,6 +31,7 @@ from nmm.base.kernels.record_layout import (
     sampled,
     views,
 )
+from nmm.base.kernels.signatures import boolean, float64, int64, void
 from nmm.control.functions.function import Function
 from nmm.control.functions.program import BESIDE, COMPILED, Buffers, LaidOut, Program, run_program
 from nmm.control.resolvers.answer import SINGULAR_J
@@ -125,9 +125,9 @@ def answered(e: ControlStep, u: Array, q_dot: Array) -> None:
 
 
 #: q, the control step's blocks, those of H.
-SEARCH = types.boolean(
-    *(types.float64[::1], types.int64[::1], types.float64[::1]),
-    *(types.int64[::1], types.float64[::1]),
+SEARCH = boolean(
+    *(float64[::1], int64[::1], float64[::1]),
+    *(int64[::1], float64[::1]),
 )
 
 
@@ -180,7 +180,7 @@ def search(q: Array, integers: Integers, floats: Array, own_integers: Integers, 
 
 
 #: t, q, the control step's blocks, those of H.
-SHORTEN = types.void(types.float64, *SEARCH.args)
+SHORTEN = void(float64, *SEARCH.args)
 
 call_shorten = caller(SHORTEN)
 

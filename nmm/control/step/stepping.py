@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
 from nmm.base.arrays import Array, Integers
 from nmm.base.kernels.compiled import compiled, compiled_without_gil, integer_scratch, scratch, view
 from nmm.base.kernels.linear_algebra import copied
 from nmm.base.kernels.record_layout import Matrix, Vector, keep, kept, put_back, record_type, views
+from nmm.base.kernels.signatures import float64, int64
 from nmm.base.kernels.velocity_map import place_mimic_joints
 from nmm.control.functions.program import BESIDE, LaidOut, run_program
 from nmm.control.integrators import MIDPOINT, Integrator, RungeKutta, WithMimicJoints, ZeroOrderHold
@@ -32,10 +32,8 @@ class Tableau(NamedTuple):
     holds: int
 
 
-_FLAT = types.float64[::1]
-ADVANCE = types.float64(
-    *(types.float64, types.float64, _FLAT, types.int64[::1], _FLAT), *(record_type(Tableau), _FLAT, _FLAT)
-)
+_FLAT = float64[::1]
+ADVANCE = float64(*(float64, float64, _FLAT, int64[::1], _FLAT), *(record_type(Tableau), _FLAT, _FLAT))
 
 
 def tableau(integrator: Integrator) -> Tableau | None:

@@ -9,12 +9,12 @@ from typing import Any
 import coal
 import numpy as np
 import pinocchio as pin
-from numba import types
 
 from nmm.base.arrays import Array, Integers
 from nmm.base.errors import NmmError
 from nmm.base.kernels.compiled import checked_by_caller, compiled
 from nmm.base.kernels.record_layout import BLOCKS, Blocks, Memory, views
+from nmm.base.kernels.signatures import float64, int64, void
 from nmm.model.collisions.broad_phase import PairArrays, find_near
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.collisions.pairs import pairs_of
@@ -24,10 +24,10 @@ from nmm.model.robots.robot import Robot
 
 #: Of Coal's queries: with its default, 1e-6, gradients err by up to 9e-3; a finer second one diverges.
 GJK_TOLERANCE, EPA_TOLERANCE = 1e-8, 1e-6
-_STRIDED = types.float64[:, :]
-_FIND = types.int64(*BLOCKS.types, _STRIDED)
-_ROW = types.void(BLOCKS, _STRIDED, _STRIDED, BLOCKS, types.int64, types.int64)
-_ROWS = types.float64(BLOCKS, _STRIDED, _STRIDED, _STRIDED, BLOCKS, types.int64)
+_STRIDED = float64[:, :]
+_FIND = int64(*BLOCKS.types, _STRIDED)
+_ROW = void(BLOCKS, _STRIDED, _STRIDED, BLOCKS, int64, int64)
+_ROWS = float64(BLOCKS, _STRIDED, _STRIDED, _STRIDED, BLOCKS, int64)
 
 
 @compiled

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import coal
 import numpy as np
-from numba import types
 
 from nmm.base.arrays import Array
 from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.record_layout import BLOCKS, Memory, views
+from nmm.base.kernels.signatures import float64, int64, void
 from nmm.model.collisions import swept
 from nmm.model.collisions.queries import Queries
 from nmm.model.collisions.swept import BRAKING, DRIVEN, LOOKS, SweptMotion
@@ -19,13 +19,13 @@ from nmm.model.robots.zero_order_hold import inputs_of
 
 #: Obstacles with a path are looked at so often while the robot stands, s.
 EVERY = 0.05
-_FLAT, _STRIDED = types.float64[::1], types.float64[:, :]
+_FLAT, _STRIDED = float64[::1], float64[:, :]
 _BOTH = (BLOCKS, BLOCKS)
-_LIST = types.int64(*_BOTH, _STRIDED, _STRIDED, _STRIDED, _FLAT, _FLAT, *(types.float64,) * 3, types.int64)
-_LAY = types.int64(BLOCKS, _FLAT, _FLAT, types.float64)
-_UNSURE = types.int64(*_BOTH, *(types.int64,) * 3)
-_SHARE = types.float64(_FLAT, _FLAT, _FLAT, types.float64)
-_RENEW = types.void(*_BOTH, _STRIDED, _STRIDED, types.int64)
+_LIST = int64(*_BOTH, _STRIDED, _STRIDED, _STRIDED, _FLAT, _FLAT, *(float64,) * 3, int64)
+_LAY = int64(BLOCKS, _FLAT, _FLAT, float64)
+_UNSURE = int64(*_BOTH, *(int64,) * 3)
+_SHARE = float64(_FLAT, _FLAT, _FLAT, float64)
+_RENEW = void(*_BOTH, _STRIDED, _STRIDED, int64)
 
 
 class Short(NamedTuple):

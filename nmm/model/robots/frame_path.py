@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import types
 
 from nmm.base.arrays import Array, Integers
 from nmm.base.kernels.compiled import clear, kernel, scratch, view
 from nmm.base.kernels.kinematics import Kinematics, compose, place_frames, place_joints
 from nmm.base.kernels.record_layout import Memory, views
+from nmm.base.kernels.signatures import float64, int64, void
 from nmm.base.progress import Progress
 from nmm.model.robots.joint_table import frame_table
 from nmm.model.robots.robot import CENTER_OF_MASS, Robot
@@ -17,9 +17,9 @@ AT_ONCE = 10_000
 
 
 @kernel(
-    types.void(
-        *(types.int64[::1], types.float64[::1], types.float64[:, ::1]),
-        *(types.float64[:, ::1], types.float64[:, :, ::1]),
+    void(
+        *(int64[::1], float64[::1], float64[:, ::1]),
+        *(float64[:, ::1], float64[:, :, ::1]),
     )
 )
 def follow_frame(integers: Integers, floats: Array, q: Array, points: Array, jacobians: Array) -> None:

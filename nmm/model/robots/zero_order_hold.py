@@ -3,12 +3,12 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
 from nmm.base.arrays import Array, Integers
 from nmm.base.kernels.compiled import call_platform, checked_by_caller, clear, compiled, scratch
 from nmm.base.kernels.linear_algebra import copied
 from nmm.base.kernels.record_layout import IntegerVector, Memory, Vector, views
+from nmm.base.kernels.signatures import float64, int64, void
 from nmm.base.kernels.velocity_map import place_mimic_joints
 from nmm.model.robots.robot import Robot
 
@@ -64,8 +64,8 @@ def _hold(
     hold_rates(views(Inputs, integers, floats, 0), q, u, u_dot, dt, ahead)
 
 
-_FLAT = types.float64[::1]
-_HOLD = types.void(types.int64[::1], _FLAT, _FLAT, _FLAT, _FLAT, types.float64, _FLAT)
+_FLAT = float64[::1]
+_HOLD = void(int64[::1], _FLAT, _FLAT, _FLAT, _FLAT, float64, _FLAT)
 #: Of inputs that are constant.
 NO_RATES = np.zeros(0)
 

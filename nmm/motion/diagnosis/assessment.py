@@ -6,12 +6,12 @@ from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
 from nmm.base.arrays import Array, Integers
 from nmm.base.errors import RunError
 from nmm.base.kernels.compiled import checked_by_caller, compiled_without_gil, scratch
 from nmm.base.kernels.record_layout import views
+from nmm.base.kernels.signatures import float64, int64, void
 from nmm.control.controller import Controller
 from nmm.control.functions.callbacks import DIFFERENCE_STEP
 from nmm.control.functions.program import BESIDE
@@ -45,9 +45,9 @@ class Instability(NamedTuple):
     limit: float
 
 
-LINEARISE = types.void(
-    *(types.int64[::1], types.float64[::1], types.float64[::1], types.float64[:, ::1]),
-    *(types.int64[::1], types.int64, types.float64[:, :, ::1]),
+LINEARISE = void(
+    *(int64[::1], float64[::1], float64[::1], float64[:, ::1]),
+    *(int64[::1], int64, float64[:, :, ::1]),
 )
 
 

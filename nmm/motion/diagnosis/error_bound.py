@@ -19,10 +19,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
 from nmm.base.arrays import Array, Flags, Integers
 from nmm.base.kernels.compiled import compiled, kernel, view
+from nmm.base.kernels.signatures import float64, int64, void
 from nmm.control.step.task_rows import gain_rows
 from nmm.motion.recording import Recorder
 from nmm.motion.residuals import differs
@@ -219,9 +219,9 @@ def step_errors(samples: Samples, order: int) -> Array:
 
 
 @kernel(
-    types.void(
-        *(types.float64[::1], types.float64[:, ::1], types.float64[:, ::1], types.float64[:, :, ::1]),
-        *(types.float64[:, ::1], types.int64[:, ::1], types.float64, types.int64, types.float64[::1]),
+    void(
+        *(float64[::1], float64[:, ::1], float64[:, ::1], float64[:, :, ::1]),
+        *(float64[:, ::1], int64[:, ::1], float64, int64, float64[::1]),
     )
 )
 def write_step_errors(

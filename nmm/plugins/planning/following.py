@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 from itertools import pairwise
 
 import numpy as np
-from numba import types
 from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, Integers
@@ -15,6 +14,7 @@ from nmm.base.errors import NmmError, RunError, expect
 from nmm.base.findings import Finding
 from nmm.base.kernels.compiled import checked_by_caller, compiled, kernel, scratch, view
 from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
+from nmm.base.kernels.signatures import float64, int64
 from nmm.control.functions.function import Function, Renewal, Row, Shown, Stage
 from nmm.control.goal import Goal, error_sizes, norms, unit_codes
 from nmm.model.robots.reach import first_tip
@@ -89,9 +89,9 @@ def from_plan(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
             rows.value_q[j, i] = W
 
 
-OUTSIDE = types.int64(
-    *(types.float64[::1], types.float64[:, ::1], types.float64[::1], types.int64, types.int64[::1]),
-    *(types.float64[::1], types.float64),
+OUTSIDE = int64(
+    *(float64[::1], float64[:, ::1], float64[::1], int64, int64[::1]),
+    *(float64[::1], float64),
 )
 
 

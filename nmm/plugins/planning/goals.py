@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numba import types
 from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, Integers
@@ -16,6 +15,7 @@ from nmm.base.errors import InputError, RunError, few
 from nmm.base.kernels.compiled import checked_by_caller, compiled, scratch
 from nmm.base.kernels.linear_algebra import dot, eliminate
 from nmm.base.kernels.record_layout import BLOCKS, IntegerCell, IntegerVector, Matrix, Vector, views
+from nmm.base.kernels.signatures import float64, int64
 from nmm.base.kernels.velocity_map import place_mimic_joints
 from nmm.control.functions.program import BESIDE, COMPILED, LaidOut, Program, run_program
 from nmm.control.functions.tasks.linear_coordinates import Posture
@@ -182,7 +182,7 @@ def newton_step(t: float, q: Array, moves: int, integers: Integers, floats: Arra
     return 0
 
 
-_STEPPED = types.int64(types.float64, types.float64[::1], types.int64, *BLOCKS.types)
+_STEPPED = int64(float64, float64[::1], int64, *BLOCKS.types)
 
 
 class TaskError:

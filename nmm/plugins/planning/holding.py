@@ -11,13 +11,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
 from nmm.base.arrays import Array, Integers
 from nmm.base.errors import InputError, expect_kind
 from nmm.base.kernels.compiled import checked_by_caller, compiled, compiled_without_gil, scratch
 from nmm.base.kernels.linear_algebra import copied
 from nmm.base.kernels.record_layout import BLOCKS, views
+from nmm.base.kernels.signatures import float64, int64
 from nmm.control.functions.program import BESIDE, evaluate
 from nmm.control.functions.tasks.pose import Pose
 from nmm.control.functions.tasks.task import Task
@@ -125,10 +125,8 @@ def follow(
     return count
 
 
-_FLAT, _ROWS = types.float64[::1], types.float64[:, ::1]
-FOLLOW = types.int64(
-    *(*BLOCKS.types, *BLOCKS.types, _FLAT, _ROWS, *(2 * [types.float64]), _ROWS, _ROWS, types.int64[::1])
-)
+_FLAT, _ROWS = float64[::1], float64[:, ::1]
+FOLLOW = int64(*(*BLOCKS.types, *BLOCKS.types, _FLAT, _ROWS, *(2 * [float64]), _ROWS, _ROWS, int64[::1]))
 
 
 class Followed(NamedTuple):

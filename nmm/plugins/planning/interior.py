@@ -9,11 +9,10 @@ their number. An end that is given is reached by multipliers, too.
 
 import math
 
-from numba import types
-
 from nmm.base.arrays import Array, Integers
 from nmm.base.kernels.compiled import clear, compiled, compiled_without_gil, scratch
 from nmm.base.kernels.record_layout import BLOCKS, views
+from nmm.base.kernels.signatures import float64, int64
 from nmm.plugins.planning.collisions.legs_check import MovedShapes
 from nmm.plugins.planning.shooting import Shooting, write_all
 
@@ -270,4 +269,4 @@ def shoot(
     return -k
 
 
-SHOOT = types.int64(*BLOCKS.types, *BLOCKS.types, types.int64, types.int64, types.float64)
+SHOOT = int64(*BLOCKS.types, *BLOCKS.types, int64, int64, float64)

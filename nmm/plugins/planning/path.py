@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numba import types
 
 from nmm.base.arrays import Array
 from nmm.base.kernels.compiled import checked_by_caller, compiled
 from nmm.base.kernels.record_layout import BLOCKS, Blocks, views
+from nmm.base.kernels.signatures import float64, int64, void
 from nmm.plugins.planning.collisions.legs_check import along
 from nmm.plugins.planning.tree import PLACE, Trees
 from nmm.plugins.planning.ways import LEGS, find_way, leg_time
@@ -32,10 +32,10 @@ def _times(blocks: Blocks, legs: Array, out: Array) -> None:
         out[k] = leg_time(ways, legs[k]) + ways.pause[()]
 
 
-_FLAT, _ROWS = types.float64[::1], types.float64[:, ::1]
-_FIND = types.int64(BLOCKS, _FLAT, _FLAT, _ROWS)
-_TIMES = types.void(BLOCKS, _ROWS, _FLAT)
-_ALONG = types.void(types.int64, _FLAT, _FLAT, types.float64, _FLAT, _FLAT)
+_FLAT, _ROWS = float64[::1], float64[:, ::1]
+_FIND = int64(BLOCKS, _FLAT, _FLAT, _ROWS)
+_TIMES = void(BLOCKS, _ROWS, _FLAT)
+_ALONG = void(int64, _FLAT, _FLAT, float64, _FLAT, _FLAT)
 
 
 class Guide:

@@ -10,12 +10,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
 from nmm.base.arrays import Array, Integers
 from nmm.base.kernels.compiled import call_platform, checked_by_caller, clear, compiled, scratch, view
 from nmm.base.kernels.linear_algebra import copied
 from nmm.base.kernels.record_layout import BLOCKS, IntegerCell, Matrix, Memory, Vector, views
+from nmm.base.kernels.signatures import float64, void
 from nmm.base.kernels.velocity_map import place_mimic_joints, to_coordinates
 from nmm.model.robots.zero_order_hold import Inputs
 
@@ -201,8 +201,8 @@ def _follow(integers: Integers, floats: Array, times: Array, q: Array, u: Array,
         write_rates(inputs, q[i], u[i], q_dot[i])
 
 
-_ROWS = types.float64[:, ::1]
-_FOLLOW = types.void(*BLOCKS.types, types.float64[::1], _ROWS, _ROWS, _ROWS)
+_ROWS = float64[:, ::1]
+_FOLLOW = void(*BLOCKS.types, float64[::1], _ROWS, _ROWS, _ROWS)
 
 
 class SampledMotion:

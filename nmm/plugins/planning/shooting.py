@@ -7,8 +7,6 @@ samples close while it is solved (`nmm.plugins.planning.interior`).
 import math
 from typing import NamedTuple
 
-from numba import types
-
 from nmm.base.arrays import Array, Integers
 from nmm.base.kernels.compiled import call_platform, clear, compiled, compiled_without_gil, scratch, view
 from nmm.base.kernels.kinematics import axes, place_joints
@@ -22,6 +20,7 @@ from nmm.base.kernels.record_layout import (
     Vector,
     views,
 )
+from nmm.base.kernels.signatures import int64
 from nmm.model.robots.wheel_rates import rolling
 from nmm.model.robots.zero_order_hold import Inputs
 from nmm.plugins.planning.collisions.legs_check import (
@@ -228,4 +227,4 @@ def first_blocked_sample(integers: Integers, floats: Array, own_integers: Intege
     return -1
 
 
-LOOK = types.int64(*BLOCKS.types, *BLOCKS.types)
+LOOK = int64(*BLOCKS.types, *BLOCKS.types)

@@ -10,8 +10,6 @@ little. What differs there, and rests at cusps, `nmm.plugins.planning.smoothing`
 import math
 from typing import NamedTuple
 
-from numba import types
-
 from nmm.base.arrays import Array, Integers
 from nmm.base.kernels.compiled import clear, compiled, compiled_without_gil, scratch
 from nmm.base.kernels.linear_algebra import copied
@@ -27,6 +25,7 @@ from nmm.base.kernels.record_layout import (
     Vector,
     views,
 )
+from nmm.base.kernels.signatures import float64, int64
 from nmm.model.robots.zero_order_hold import Inputs
 from nmm.plugins.planning.collisions.legs_check import MovedShapes, too_near
 from nmm.plugins.planning.samples import flow
@@ -274,6 +273,6 @@ def trace(own_integers: Integers, own_floats: Array, q: Array, motion: Array, ou
     return count
 
 
-_FLAT, _ROWS = types.float64[::1], types.float64[:, ::1]
-SEARCH = types.int64(*BLOCKS.types, *BLOCKS.types, types.int64)
-TRACE = types.int64(*BLOCKS.types, _FLAT, _ROWS, _ROWS)
+_FLAT, _ROWS = float64[::1], float64[:, ::1]
+SEARCH = int64(*BLOCKS.types, *BLOCKS.types, int64)
+TRACE = int64(*BLOCKS.types, _FLAT, _ROWS, _ROWS)

@@ -13,8 +13,6 @@ all 157 pairs of a UR5 on a car takes 6, one at the pairs that are due along a m
 import math
 from typing import NamedTuple
 
-from numba import types
-
 from nmm.base.arrays import Array, Integers
 from nmm.base.kernels.compiled import compiled, compiled_without_gil, scratch
 from nmm.base.kernels.linear_algebra import copied
@@ -28,6 +26,7 @@ from nmm.base.kernels.record_layout import (
     header_length,
     views,
 )
+from nmm.base.kernels.signatures import float64, int64
 from nmm.base.kernels.velocity_map import place_mimic_joints
 from nmm.plugins.planning.collisions.legs_check import MovedShapes, along, first_blocked, too_near
 from nmm.plugins.planning.ways import Ways, find_way, least_time, leg_time, way_time
@@ -180,4 +179,4 @@ def search(integers: Integers, floats: Array, rounds: int, legs: Array) -> int:
     return 0
 
 
-SEARCH = types.int64(*BLOCKS.types, types.int64, types.float64[:, ::1])
+SEARCH = int64(*BLOCKS.types, int64, float64[:, ::1])

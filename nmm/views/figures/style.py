@@ -355,4 +355,7 @@ def save(made: Figure, path: str | Path) -> Path:
 
 
 def save_as(made: Figure, folder: Path, name: str, options: FigureOptions) -> list[Path]:
-    return [save(made, folder / f"{name}.{kind}") for kind in options.formats]
+    """Write a figure in each format; the picture that it was drawn into, some MB, is not kept."""
+    paths = [save(made, folder / f"{name}.{kind}") for kind in options.formats]
+    FigureCanvasAgg(made)
+    return paths

@@ -5,11 +5,11 @@ from typing import Any
 import coal
 import numpy as np
 import pinocchio as pin
-from numba import types
 
 from nmm.base.arrays import Array, Integers
 from nmm.base.kernels.compiled import checked_by_caller, compiled
 from nmm.base.kernels.record_layout import BLOCKS, Blocks, Memory, views
+from nmm.base.kernels.signatures import float64, int64
 from nmm.model.collisions.queries import Queries
 from nmm.model.collisions.scene import Scene
 from nmm.model.collisions.separation import ConvexShapes
@@ -26,9 +26,9 @@ def _too_near(blocks: Blocks, q: Array) -> int:
     return too_near(views(MovedShapes, blocks.integers, blocks.floats, 0), q)
 
 
-_FLAT = types.float64[::1]
-_NEAR = types.int64(BLOCKS, _FLAT)
-_BLOCKED = types.int64(*BLOCKS.types, _FLAT, types.float64[:, ::1], types.int64, _FLAT)
+_FLAT = float64[::1]
+_NEAR = int64(BLOCKS, _FLAT)
+_BLOCKED = int64(*BLOCKS.types, _FLAT, float64[:, ::1], int64, _FLAT)
 
 
 class MotionCheck:
