@@ -58,12 +58,15 @@ class Number(Type):
 class Array(Type):
     """dtype : a `Number`; ndim; layout : C or F for contiguous arrays, else A; mutable"""
 
-    dtype: Number
+    dtype: Type
     ndim: int
     layout: str
     mutable: bool
 
-    def _describe(self, dtype: Number, ndim: int, layout: str, mutable: bool = True) -> None:
+    def __new__(cls, dtype: Type, ndim: int, layout: str, mutable: bool = True) -> Any:
+        return super().__new__(cls, dtype, ndim, layout, mutable)
+
+    def _describe(self, dtype: Type, ndim: int, layout: str, mutable: bool) -> None:
         self.dtype, self.ndim, self.layout, self.mutable = dtype, ndim, layout, mutable
         self.text = f"{'' if mutable else 'readonly '}array({dtype}, {ndim}d, {layout})"
 
@@ -74,7 +77,10 @@ class Tuple(Type):
     types: tuple[Type, ...]
     record: type | None
 
-    def _describe(self, types: tuple[Type, ...], record: type | None = None) -> None:
+    def __new__(cls, types: tuple[Type, ...], record: type | None = None) -> Any:
+        return super().__new__(cls, types, record)
+
+    def _describe(self, types: tuple[Type, ...], record: type | None) -> None:
         self.types, self.record = types, record
         equal = len(types) > 0 and len({*types}) == 1
         name = ("UniTuple" if equal else "Tuple") if record is None else record.__name__
