@@ -28,6 +28,10 @@ EXCEPTIONS = {
         "nmm.control.functions.callbacks",
         "DIFFERENCE_STEP",
     ): "differences of the same step as those of users' functions",
+    **{
+        ("nmm.base.kernels.signatures", name): "types of compiled functions; packages outside use numba's"
+        for name in ("boolean", "float64", "int64", "void")
+    },
     ("nmm.base.kernels", "records"): "the kernels' records, as a module, traced with symbols",
     ("nmm.model.collisions.pairs", "measured_pairs"): "a scenario's draft leaves out pairs that touch",
     ("nmm.model.collisions.pairs", "random_configurations"): "a scenario's draft leaves out pairs that touch",
