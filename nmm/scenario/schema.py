@@ -207,7 +207,7 @@ class ScenarioPart(Part):
             rest = (limits, self.dt, retreat, steering or False)
             second: Any = {"order": self.order, "servo": self.servo} if self.order == 2 else {}
             if sequenced:
-                return SequencedController(robot, task, resolver, objective, *rest, **second)
+                return SequencedController(robot, task, resolver, objective, *rest, collisions, **second)
             if isinstance(self.resolver, WithAddedTask):
                 with at("added_task"):
                     added = build_tasks(self._added_task(self.resolver), robot)
