@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,10 +18,11 @@ from nmm.control.functions.function import Row
 from nmm.control.functions.objectives.base import Objective
 from nmm.control.functions.program import PINOCCHIO, nothing
 from nmm.control.functions.tasks.task import Stack, Task
-from nmm.control.integrators import STEPPING, integrator
+from nmm.control.integrators import STEPPING
 from nmm.control.limits.collisions import Collisions
 from nmm.control.limits.limits import Limits
 from nmm.control.period_monitor import PeriodMonitor
+from nmm.control.plant import Plant, method_for
 from nmm.control.resolvers.base import Resolver
 from nmm.control.retreat import Retreat
 from nmm.control.sequencing.sequence import Schedule
@@ -74,7 +75,7 @@ class Controller:
     ------
     InputError : a frame, coordinate or input that the robot lacks; more rows than inputs; an added task with
         a resolver that takes none, or none with one that needs it; a step "armijo" without an objective; at
-        order 2 collisions, a retreat, a step "armijo", or limits with a servo above 1 / dt
+        order 2 collisions, or a servo above 1 / dt with what needs dt
 
     Examples
     --------
@@ -190,6 +191,10 @@ class Controller:
         """Copies and pickles are built anew, as views of memory and addresses of kernels cannot be copied."""
         return type(self), tuple(self.given._replace(dt=self.dt))
 
+    def with_arguments(self, **arguments: Any) -> Self:
+        """A new controller with other arguments (`Given`), without what this one remembers."""
+        return type(self)(*self.given._replace(**{"dt": self.dt, **arguments}))
+
     @property
     def order(self) -> int:
         """1 where it gives u, 2 where it gives u_dot."""
@@ -282,9 +287,12 @@ class Controller:
             u = vector(u, self.robot.n_u, "u")
         before[:] = u
 
-    def step(self, t: float, q: ArrayLike, dt: float, method: str = "rk4") -> tuple[Array, Array]:
+    def step(
+        self, t: float, q: ArrayLike, dt: float, method: str = "rk4", *, plant: Plant | None = None
+    ) -> tuple[Array, Array]:
         """One sample of the closed loop: q (n,) at t + dt, and the inputs u (m,) at t; of "zoh_midpoint"
-        those at t + dt/2, q + dt/2 S u, which are to be held over dt.
+        those at t + dt/2, q + dt/2 S u, which are to be held over dt. At order 2 the next sample is at the
+        inputs that u_dot leads to.
 
         It is one compiled call unless it involves users' Python functions, distances, a retreat or a step by
         Armijo's rule, if the kinematics are compiled, too, or the method has one stage ("euler", "zoh").
@@ -293,17 +301,19 @@ class Controller:
         ----------
         dt : s; also becomes the controller's dt where it needs one
         method : "rk4", "midpoint", "euler", "zoh" or "zoh_midpoint"
+        plant : a robot that does not do as it is told (`Disturbances.plant`), with "zoh"; None for the ideal
 
         Raises
         ------
-        SingularError, InputError : as a call; "zoh_midpoint" with distances, which the sample's inputs keep
+        SingularError, InputError : as a call; a method that does not go with limits at order 2, or a plant;
+            "zoh_midpoint" with distances, which the sample's inputs keep
         """
         if type(q) is not np.ndarray or q.dtype != FLOAT64 or q.shape != self._shape or not q.flags.carray:
             q = self._copied(q)
-        if self.solver.second:
-            raise InputError("is not known at order 2", where="step", expected="u_dot = controller(t, q, u)")
         if not 0.0 < dt < math.inf:
             positive(dt, "dt")
+        if plant is not None:
+            return plant.step(self, float(t), q, dt, method)
         if self.solver.samples and dt != self.solver.dt:
             self.dt = dt
         if method not in self._steppers:
@@ -312,8 +322,8 @@ class Controller:
 
     def _stepper(self, method: str) -> Callable[[float, Array, float], tuple[Array, Array]]:
         solver = self.solver
-        integrates = integrator(method, self.robot, 1e-9)
-        if integrates.tolerance:
+        plain = method_for((self,), method)
+        if plain.tolerance:
             raise InputError(where="method", expected=listed(STEPPING, "or"), got=method)
         if method == "zoh_midpoint" and self.safety_filter is not None:
             raise InputError(
@@ -322,22 +332,22 @@ class Controller:
                 expected="zoh",
                 got=method,
             )
-        found, prepare = tableau(integrates), solver.program.prepare
+        found, prepare, ideal = tableau(plain), solver.program.prepare, Plant(plain).under(self)
         stages = found is None or len(found.weights) > 1
         # What Python prepares is valid at (t, q) only, but methods with stages evaluate elsewhere, too.
         if found is None or (stages and prepare is not nothing) or not solver.compiles_steps:
 
             def from_python(t: float, q: Array, dt: float) -> tuple[Array, Array]:
-                u, q_dot = self(t, q), self._q_dot.copy()
-                if not stages:
-                    return integrates.advance(self.velocity, t, q, q_dot, u, dt), u
+                answer, q_dot = self(t, q), self._q_dot.copy()
+                u = solver.before.copy() if solver.second else answer
                 left, held = solver.sample.snapshot(), u
                 try:
-                    held = integrates.inputs(solver.inputs_at, t, q, q_dot, u, dt)
-                    return integrates.advance(self.velocity, t, q, q_dot, held, dt), held
+                    held = ideal.inputs(solver.inputs_at, t, q, q_dot, u, dt)
+                    return ideal.advance(self.velocity, t, q, q_dot, held, dt), held
                 finally:
                     solver.sample.end_stages(left)
-                    solver.count_from(held)
+                    if held is not u:
+                        solver.count_from(held)
 
             return from_python
         run, blocks = checked_by_caller(advance, ADVANCE), solver.blocks

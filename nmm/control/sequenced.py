@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence as Several
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.base.arrays import Array
+from nmm.base.arrays import Array, positive
 from nmm.base.errors import InputError, RunError
 from nmm.base.text_format import listed
 from nmm.control.controller import Controller
@@ -17,6 +18,7 @@ from nmm.control.functions.references import Constant
 from nmm.control.functions.tasks.task import Stack, Task
 from nmm.control.limits.collisions import Collisions
 from nmm.control.limits.limits import Limits
+from nmm.control.plant import Plant
 from nmm.control.resolvers.base import Resolver
 from nmm.control.resolvers.callable_resolver import CallableResolver
 from nmm.control.resolvers.problem import Problem
@@ -122,6 +124,11 @@ class SequencedController(Controller):
         given = self.given._replace(dt=self.dt)
         return type(self), (*given[:4], *given[5:])  # no added task
 
+    def with_arguments(self, **arguments: Any) -> Self:
+        """As for `Controller`."""
+        given: tuple[Any, ...] = self.given._replace(**{"dt": self.dt, **arguments})
+        return type(self)(*given[:4], *given[5:])
+
     def _controller(self, active: tuple[bool, ...], dt: float | None) -> Controller:
         """The controller of a set of active tasks."""
         if active not in self._controllers:
@@ -159,9 +166,13 @@ class SequencedController(Controller):
             self.switch()
         return self.current(t, q, u)
 
-    def step(self, t: float, q: ArrayLike, dt: float, method: str = "rk4") -> tuple[Array, Array]:
+    def step(
+        self, t: float, q: ArrayLike, dt: float, method: str = "rk4", *, plant: Plant | None = None
+    ) -> tuple[Array, Array]:
         """As for `Controller`; decides which tasks are active, for the whole step."""
         q = self.robot.q(q)
+        if plant is not None:
+            return plant.step(self, float(t), q, positive(dt, "dt"), method)
         if self.schedule.changes(float(t), q):
             self.switch()
         return self.current.step(t, q, dt, method)

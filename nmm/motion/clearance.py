@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from nmm.base.arrays import Array, Integers
-from nmm.control.controller import Controller
-from nmm.control.integrators import Around, Inputs, Integrator, Velocity
-from nmm.control.step.safety_filter import SafetyFilter
 from nmm.model.collisions.obstacle import Obstacle, as_passed, shifts
 from nmm.model.collisions.scene import Scene
 from nmm.model.robots.zero_order_hold import HeldInputs
@@ -45,34 +41,6 @@ class Swept(NamedTuple):
             "clearance_points": self.points,
             "obstacles": self.obstacles,
         }
-
-
-@dataclass(frozen=True)
-class Guarded(Around):
-    """Holds the inputs where anything is near: the safety filter checks the path that held inputs make."""
-
-    safety_filter: SafetyFilter
-    held: HeldInputs
-
-    def inputs(self, stage: Inputs, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
-        """Other inputs than the sample's are not checked: they are taken where nothing is near."""
-        if self.safety_filter.held:
-            return u
-        found = self.integrator.inputs(stage, t, q, q_dot, u, dt)
-        near = found is not u and not self.safety_filter.clear(np.abs(self.held(q, found, dt) - q).sum())
-        return u if near else found
-
-    def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
-        if not self.safety_filter.held:
-            ahead = self.integrator.advance(velocity, t, q, q_dot, u, dt)
-            if self.safety_filter.clear(float(np.abs(ahead - q).sum())):
-                return ahead
-        return self.held(q, u, dt)
-
-
-def guarded(advance: Integrator, controller: Controller) -> Integrator:
-    safety_filter = controller.safety_filter
-    return advance if safety_filter is None else Guarded(advance, safety_filter, HeldInputs(controller.robot))
 
 
 def swept(scene: Scene, t: Array, q: Array, u: Array, places: Sequence[Sequence[Any]]) -> Swept:

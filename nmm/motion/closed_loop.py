@@ -1,4 +1,4 @@
-"""The closed loop from sample to sample, recorded, ending cleanly whatever happens."""
+"""The closed loop of a controller and a plant from sample to sample, recorded; it ends cleanly."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from nmm.base.findings import Finding
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.integrators import Integrator
+from nmm.control.plant import Plant
 from nmm.control.step.sample import Snapshot
 from nmm.control.step.step import Step
 from nmm.motion.compiled_loop import DIVERGED_BEYOND, CompiledLoop, compiled_loop
@@ -25,7 +26,7 @@ from nmm.motion.verdict import FindingLine, Outcome
 
 def drive_loop(
     controller: Controller,
-    advance: Integrator,
+    plant: Plant | Integrator,
     recorder: Recorder,
     times: Array,
     q: Array,
@@ -33,15 +34,23 @@ def drive_loop(
     until: Goal | None = None,
     leg: Leaving | None = None,
 ) -> tuple[Outcome, FindingLine]:
+    """Record a run over the times (N,) from q (n,), of a plant, or of the ideal one that an integrator moves.
+    A `leg` goes on with what the one before left, up to the event that ends it."""
+    if isinstance(plant, Integrator):
+        plant = Plant(plant)
+    recorder.disturbed = plant.disturbs
+    recorder.believed = plant.disturbed.believed if len(plant.disturbed.believed) else None
+    if leg is None or leg.earlier == -math.inf:
+        plant.begin(q)
     if leg is None:
         controller.solver.begin_run()
     elif controller.solver.retreat_state is not None:  # what the leg before leaves to this one is there
         recorder.backed_off = controller.solver.retreat_state.count
     try:
-        pass_over = compiled_loop(controller, advance, until)
+        pass_over = compiled_loop(controller, plant, until)
         # What is taken in Python, too: otherwise digits would depend on where compiled code stops.
         with nullcontext() if pass_over is None else controller.solver.program.compiled_kinematics():
-            _Loop(controller, advance, recorder, times, until, leg, pass_over).run(q, progress)
+            _Loop(controller, plant, recorder, times, until, leg, pass_over).run(q, progress)
     except SingularError as error:
         return Outcome.SINGULAR, (finding_in(error),)
     except DivergedError as error:
@@ -65,7 +74,7 @@ class _Loop:
     """From sample to sample, recording each, up to the event that ends a leg, whose sample is the next leg's.
 
     A step that the resolver's state rejects is repeated with a new decision at its start; if that is
-    rejected, too, with decisions free at its stages.
+    rejected, too, with decisions free at its stages. A disturbed robot's steps are not repeated.
 
     This is the loop of all controllers. Its second form, `pass_over`, skips samples with purely numerical
     decisions. Python handles what is not compiled: users' functions and `State` subclasses, distances (Coal's
@@ -73,7 +82,7 @@ class _Loop:
     """
 
     controller: Controller
-    advance: Integrator
+    plant: Plant
     recorder: Recorder
     times: Array
     until: Goal | None
@@ -83,11 +92,12 @@ class _Loop:
     def __post_init__(self) -> None:
         solver = self.controller.solver
         self.state, self.kept, self.renewals = solver.state, solver.sample, solver.program.renewals
+        self.advance = self.plant.under(self.controller)
 
     def run(self, q: Array, progress: Callable[[float], None] | None) -> None:
         recorder, times, steps = self.recorder, self.times, len(self.times) - 1
         earlier = self.kept.snapshot()
-        sample = self._sample(float(times[0]), q, -math.inf if self.leg is None else self.leg.earlier)
+        sample = self._sample(0, q, -math.inf if self.leg is None else self.leg.earlier)
         recorder.add(sample)
         k, there = 0, False
         a_share = steps if progress is None else max(1, steps // 100)
@@ -98,11 +108,11 @@ class _Loop:
             if reached > k:
                 recorder.passed_over(reached)
                 k, earlier = reached, self.kept.snapshot()
-                sample = self._sample(float(times[k]), recorder.q[k].copy(), float(times[k - 1]))
+                sample = self._sample(k, recorder.q[k].copy(), float(times[k - 1]))
                 recorder.replace_last(sample)
                 there = self._there(sample)
             if not (whole or there or k == steps):
-                following, here = self._next(sample, float(times[k + 1]), earlier)
+                following, here = self._next(sample, k + 1, earlier)
                 if following is None:
                     return
                 k, earlier, sample = k + 1, here, following
@@ -128,7 +138,7 @@ class _Loop:
         reached, whole = self.pass_over(self.times, k, last, found)
         for one in (*self.renewals, *(() if self.leg is None else (self.leg,))):
             those = slice(k + 1, reached + 1)
-            stays = k + one.stays(self.times[those], found.q[those])
+            stays = k + one.stays(self.times[those], self.plant.seen(those, found.q[those]))
             if stays < reached:  # begin again, up to the sample before the event
                 whole, reached = False, stays
                 self.kept.restore(left)
@@ -136,35 +146,40 @@ class _Loop:
                     self.pass_over(self.times, k, stays, found)
         return reached, whole
 
-    def _next(self, sample: Step, t: float, earlier: Snapshot) -> tuple[Step | None, Snapshot]:
-        """The sample at t (None: another leg's), the state before it; `earlier`: that before `sample`."""
+    def _next(self, sample: Step, k: int, earlier: Snapshot) -> tuple[Step | None, Snapshot]:
+        """Sample k (None: another leg's), the state before it; `earlier`: that before `sample`."""
+        if self.plant.disturbs:
+            dt = float(self.times[k] - self.times[k - 1])
+            q = self.plant.act(self.controller.solver, k - 1, sample.q, dt)
+            here = self.kept.snapshot()
+            return self._next_sample(k, q, sample.t), here
         here = self.kept.snapshot()
-        stands, following, here = self._advanced(sample, t, here)
+        stands, following, here = self._advanced(sample, k, here)
         if not stands:
             self.kept.restore(earlier)
             self.state.reset()
             if self.controller.solver.second:
                 self.controller.solver.before[:] = sample.u
-            sample = self._sample(sample.t, sample.q)
+            sample = self._sample(k - 1, sample.q)
             self.recorder.replace_last(sample)
             before, here = self.state.memory.copy(), self.kept.snapshot()
-            stands, following, here = self._advanced(sample, t, here)
+            stands, following, here = self._advanced(sample, k, here)
             if not stands:
                 self.kept.restore(here)
-                q, held = self._integrated(sample, t)
+                q, held = self._integrated(sample, k)
                 here = self._hold(sample, held, here)
-                following = self._next_sample(t, q, sample.t)
+                following = self._next_sample(k, q, sample.t)
                 reserved = self.state.reservation(before, self.controller.robot.u_names, sample.t)
                 self.recorder.find_once(reserved)
         return following, here
 
-    def _advanced(self, sample: Step, t: float, here: Snapshot) -> tuple[bool, Step | None, Snapshot]:
-        """Whether the step to t stands, the sample there (None: another leg's), and the state before
+    def _advanced(self, sample: Step, k: int, here: Snapshot) -> tuple[bool, Step | None, Snapshot]:
+        """Whether the step to sample k stands, that sample (None: another leg's), and the state before
         it: `here` where the sample's own inputs are held."""
         left, before = self.kept.snapshot(), self.state.memory.copy()
         try:
             with self.state.held():
-                q, held = self._integrated(sample, t)
+                q, held = self._integrated(sample, k)
         except SingularError:
             if self.state.may_stand(before):
                 raise
@@ -173,7 +188,7 @@ class _Loop:
             return False, None, here
         self.kept.end_stages(left)
         before_next = self._hold(sample, held, here)
-        following = self._next_sample(t, q, sample.t)
+        following = self._next_sample(k, q, sample.t)
         stands = following is None or self.state.may_stand(before)
         return stands, following, before_next if stands else here
 
@@ -191,30 +206,32 @@ class _Loop:
         self.controller.solver.count_from(held)
         return here
 
-    def _next_sample(self, t: float, q: Array, earlier: float) -> Step | None:
-        """The sample at t; None if an event ends the leg there."""
-        changes = self.leg is not None and self.leg.changes(t, q)
-        return None if changes else self._sample(t, q, earlier)
+    def _next_sample(self, k: int, q: Array, earlier: float) -> Step | None:
+        """Sample k; None if an event ends the leg there."""
+        if self.leg is not None and self.leg.changes(float(self.times[k]), q, self.plant.seen(k, q)):
+            return None
+        return self._sample(k, q, earlier)
 
-    def _integrated(self, sample: Step, t: float) -> tuple[Array, Array]:
-        """q at t, and the inputs of the step."""
-        at, dt = (sample.t, sample.q, sample.q_dot), t - sample.t
+    def _integrated(self, sample: Step, k: int) -> tuple[Array, Array]:
+        """q at sample k, and the inputs of the step."""
+        at, dt = (sample.t, sample.q, sample.q_dot), float(self.times[k]) - sample.t
         held = self.advance.inputs(self.controller.solver.inputs_at, *at, sample.u, dt)
         return self.advance.advance(self.controller.velocity, *at, held, dt), held
 
-    def _sample(self, t: float, q: Array, earlier: float = -math.inf) -> Step:
-        """The sample at t; accelerations count from the one at `earlier`, finally less than dt before."""
-        controller = self.controller
+    def _sample(self, k: int, q: Array, earlier: float = -math.inf) -> Step:
+        """Sample k, at q; accelerations count from the one at `earlier`, finally less than dt before."""
+        controller, t, seen = self.controller, float(self.times[k]), self.plant.seen(k, q)
         _within_bound(q, "coordinates", t)
         if t - earlier < (controller.dt or math.nan) * (1.0 - 1e-9):
             self.kept.elapsed = t - earlier
         for one in self.renewals:
-            one.renew(t, q)
+            one.renew(t, seen, q)
         controller.period_monitor.forget()  # compiled code has made those between
         try:
-            controller(t, q)
+            controller(t, seen)
         finally:
             self.kept.elapsed = None
+        self.plant.observe(controller.solver, t, q)
         sample = controller.last(t, q)
         _within_bound(sample.u, "inputs", t)
         return sample

@@ -25,8 +25,8 @@ from nmm.base.kernels.signatures import float64, int64
 from nmm.control.controller import Controller
 from nmm.control.functions.program import BESIDE
 from nmm.control.goal import Goal, norms, unit_codes
-from nmm.control.integrators import Accelerated, Integrator
-from nmm.control.resolvers.answer import SINGULAR_J
+from nmm.control.plant import Disturbed, Plant, act, observe
+from nmm.control.resolvers.answer import SINGULAR_J, SOLVED
 from nmm.control.resolvers.base import State
 from nmm.control.resolvers.partitions import COLUMNS, FREE, HELD, MODE, OVERDUE, SIGN, PartitionState
 from nmm.control.step.equations import ControlStep, call_step, watch_error
@@ -59,7 +59,8 @@ class Choice(NamedTuple):
 
 ADVANCE_SAMPLES = int64(
     *(int64[::1], float64[::1], record_type(Tableau), float64[::1], int64),
-    *(int64, int64, record_type(Ends), record_type(Choice), record_type(Recorded)),
+    *(int64, int64, record_type(Ends), record_type(Choice), record_type(Disturbed)),
+    record_type(Recorded),
 )
 
 
@@ -127,11 +128,13 @@ def advance_samples(
     partitioned: int,
     ends: Ends,
     choice: Choice,
+    disturbed: Disturbed,
     found: Recorded,
 ) -> int:
     """From the sample `first`, just made, towards `last`; returns the last one recorded. Stops before a step
     that fails, is rejected or leads to a retreat, and at samples that widened limits or arrived; the state is
-    then as before that sample, which is to be made again (as after `first` if none was recorded)."""
+    then as before that sample, which is to be made again (as after `first` if none was recorded). Steps of a
+    disturbed robot are not rejected; q, r and errors are the robot's, not those that the controller sees."""
     e = views(ControlStep, integers, floats, BESIDE)
     n = found.q.shape[1]
     count, size = kept(integers, floats)
@@ -139,7 +142,9 @@ def advance_samples(
     was, was_integers = view(both, 0, (size,)), view(both_integers, 0, (count,))
     now, now_integers = view(both, size, (size,)), view(both_integers, count, (count,))
     ahead, decided = scratch(n), integer_scratch(e.state.shape[0] + 1)
-    held = scratch(e.answer.u.shape[0])
+    held, seen = scratch(e.answer.u.shape[0]), scratch(n)
+    disturbs, noisy = disturbed.slip.shape[0] > 0, disturbed.noise.shape[0] > 0
+    believes = disturbed.believed.shape[0] > 0
     keep(integers, floats, was_integers, was)
     reached = first
     for k in range(first + 1, last + 1):
@@ -149,7 +154,12 @@ def advance_samples(
         if partitioned == 1:
             e.state[MODE] = HELD
         q = view(found.q, (k - 1) * n, (n,))
-        status = go_on(times[k - 1], times[k] - times[k - 1], q, integers, floats, method, ahead)
+        dt = times[k] - times[k - 1]
+        if disturbs:
+            act(k - 1, dt, q, integers, floats, disturbed, ahead)
+            status = float(SOLVED)
+        else:
+            status = go_on(times[k - 1], dt, q, integers, floats, method, ahead)
         fine = status < SINGULAR_J and within_bound(ahead)
         if partitioned == 1:
             fine = fine and e.state[MODE] != OVERDUE and not passed_zero(e, decided)
@@ -161,15 +171,21 @@ def advance_samples(
             if method.holds == 1:
                 note_held(integers, floats, q, held, k - 1, found)
             keep(integers, floats, now_integers, now)
+        for i in range(n):
+            seen[i] = disturbed.believed[k, i] if believes else ahead[i]
+            if noisy:
+                seen[i] += disturbed.noise[k, i]
         whole = whole_alpha(e, choice)
-        status = compiled_sample(times[k], times[k - 1], ahead, integers, floats)
+        status = compiled_sample(times[k], times[k - 1], seen, integers, floats)
         if choice.code != 0:
-            call_shorten(choice.code, times[k], ahead, integers, floats, choice.integers, choice.floats)
-            status = e.answer.status[()]
+            call_shorten(choice.code, times[k], seen, integers, floats, choice.integers, choice.floats)
+            status = float(e.answer.status[()])
         if watch_error(integers, floats) or status >= SINGULAR_J or not within_bound(e.answer.u):
             break
-        if partitioned == 1 and passed_zero(e, decided):
+        if partitioned == 1 and not disturbs and passed_zero(e, decided):
             break
+        if noisy or believes:
+            observe(times[k], ahead, integers, floats)
         note_sample(integers, floats, ahead, partitioned, alpha(e, choice) / whole, k, found)
         reached = k
         side = (reached - first) % 2
@@ -183,8 +199,10 @@ def advance_samples(
 
 
 class CompiledLoop:
-    def __init__(self, controller: Controller, method: Tableau, until: Goal | None) -> None:
-        self._controller, self._method = controller, method
+    def __init__(
+        self, controller: Controller, method: Tableau, disturbed: Disturbed, until: Goal | None
+    ) -> None:
+        self._controller, self._method, self._disturbed = controller, method, disturbed
         self._partitioned = int(isinstance(controller.solver.state, PartitionState))
         self._ends = Ends(
             unit_codes(controller.rows),
@@ -201,18 +219,18 @@ class CompiledLoop:
         last = min(last, first + self._at_once)
         began = time.perf_counter()
         with self._controller.solver.compiled() as blocks:
-            given = self._method, times, first, last, self._partitioned, self._ends, self._choice, found
-            reached = self._fly(*blocks, *given)
+            given = self._method, times, first, last, self._partitioned, self._ends, self._choice
+            reached = self._fly(*blocks, *given, self._disturbed, found)
         if reached == last:
             fitting = 0.8 * A_CALL * (last - first) / max(time.perf_counter() - began, 1e-9)
             self._at_once = max(self._at_once, min(int(fitting), MOST_TIMES * self._at_once))
         return reached, reached == last
 
 
-def compiled_loop(controller: Controller, advance: Integrator, until: Goal | None) -> CompiledLoop | None:
+def compiled_loop(controller: Controller, plant: Plant, until: Goal | None) -> CompiledLoop | None:
     """The loop of a controller that compiles as a whole, else None."""
-    method = tableau(advance.plain if isinstance(advance, Accelerated) else advance)
+    method = tableau(plant.integrator)
     plain = type(controller.solver.state) in (State, PartitionState) and type(until) in (Goal, type(None))
     if method is None or not (plain and controller.solver.compiles_runs):
         return None
-    return CompiledLoop(controller, method, until)
+    return CompiledLoop(controller, method, plant.disturbed, until)

@@ -10,22 +10,9 @@ from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, counted, positive, scalar
 from nmm.base.errors import InputError, expect, expect_known
-from nmm.base.kernels.record_layout import Matrix, Vector
+from nmm.control.integrators import integrator
+from nmm.control.plant import UNDISTURBED, Disturbed, Plant
 from nmm.model.robots.robot import Robot
-
-
-class Disturbed(NamedTuple):
-    """A run's disturbances: noise (N or 0, n) added to q at each sample before the controller sees it, m and
-    rad; the delay, in samples, until inputs act; slip (m,), the share of each input that acts; creep, s, by
-    which a platform slides sideways, at creep v ω; and what the controller believes its q to be by odometry,
-    believed (N or 0, n), put right every `correct` samples (0: never)."""
-
-    noise: Matrix
-    delay: int
-    slip: Vector
-    creep: float
-    believed: Matrix
-    correct: int
 
 
 class Disturbances:
@@ -77,7 +64,7 @@ class Disturbances:
         self.correct = None if correct is None else positive(correct, "correct")
         expect(self.odometry or correct is None, "correct", "nothing without odometry", correct)
 
-    def on(self, robot: Robot, dt: float, count: int | None = None) -> Plant:
+    def on(self, robot: Robot, dt: float, count: int | None = None) -> Disturbing:
         """What disturbs one run of the robot, sampled every dt, s, or `count` runs, which may have slip of
         their own, (count, m); `InputError` for what the robot does not have."""
         if robot.platform.n_p < 3 and (self.odometry or self.creep):
@@ -85,7 +72,7 @@ class Disturbances:
             raise InputError("odometry and creep are a mobile platform's", where=f"{what}: {robot.name}")
         shape = (robot.n_u,) if count is None else (count, robot.n_u)
         slip = _each(self.slip, 1.0, robot.u_names, shape, "slip")
-        return Plant(
+        return Disturbing(
             noise=_each(self.noise, 0.0, robot.q_names, (robot.n,), "noise"),
             delay=self.delay,
             slip=slip.reshape(-1, robot.n_u),
@@ -95,8 +82,25 @@ class Disturbances:
             seed=self.seed,
         )
 
+    def plant(self, robot: Robot, dt: float) -> Plant:
+        """A robot that does so, for `Controller.step`: one run of it, sampled every dt, s.
 
-class Plant(NamedTuple):
+        Examples
+        --------
+        >>> robot = nmm.load("unicycle_2r")
+        >>> task = nmm.Task(nmm.Position("ee", "xy"), [2.0, 1.0])
+        >>> controller = nmm.Controller(robot, task, nmm.ProjectedGradient())
+        >>> worn, q = nmm.Disturbances(slip={"v": 0.9}).plant(robot, 0.01), robot.q({"q2": 0.5})
+        >>> for k in range(500):
+        ...     q, u = controller.step(0.01 * k, q, 0.01, "zoh", plant=worn)
+        >>> bool(np.linalg.norm(controller.evaluate(5.0, q).error) < 0.02)
+        True
+        """
+        disturbing = self.on(robot, dt)
+        return Plant(integrator("zoh", robot, 1e-9), disturbing.at(0, 1), lambda N: disturbing.at(0, N))
+
+
+class Disturbing(NamedTuple):
     """Disturbances of B runs: noise (n,), slip (B, m), and what is the same in all; `correct` in samples."""
 
     noise: Array
@@ -107,27 +111,37 @@ class Plant(NamedTuple):
     correct: int
     seed: int
 
-    @property
-    def noisy(self) -> bool:
-        return bool(np.any(self.noise > 0.0))
-
-    @property
-    def misleads(self) -> bool:
-        """Whether a controller sees another q than the robot's."""
-        return self.noisy or self.odometry
-
-    @property
-    def disturbs(self) -> bool:
-        return bool(self.misleads or self.delay or self.creep or np.any(self.slip != 1.0))
-
     def at(self, i: int, samples: int) -> Disturbed:
         """Of run i."""
-        noise = np.zeros((0, len(self.noise)))
-        if self.noisy:
-            drawn = np.random.default_rng([self.seed, i]).standard_normal((samples, len(self.noise)))
-            noise = drawn * self.noise
-        believed = np.zeros((samples if self.odometry else 0, len(self.noise)))
-        return Disturbed(noise, self.delay, self.slip[i].copy(), self.creep, believed, self.correct)
+        noisy = bool(np.any(self.noise > 0.0))
+        acts = self.delay or self.creep or np.any(self.slip != 1.0)
+        if not (noisy or self.odometry or acts):
+            return UNDISTURBED
+        n, m = len(self.noise), self.slip.shape[1]
+        noise = np.zeros((0, n))
+        if noisy:
+            noise = np.random.default_rng([self.seed, i]).standard_normal((samples, n)) * self.noise
+        return Disturbed(
+            noise=noise,
+            delay=self.delay,
+            slip=self.slip[i].copy(),
+            creep=self.creep,
+            believed=np.zeros((samples if self.odometry else 0, n)),
+            correct=self.correct,
+            first=0,
+            asked=np.zeros((self.delay + samples, 2 * m)),
+        )
+
+
+def check_disturbed(disturbed: Disturbed, method: str) -> None:
+    """`InputError` for a method by which a disturbed robot does not move."""
+    if len(disturbed.slip) and method != "zoh":
+        raise InputError(
+            "disturbances are a sampled controller's, whose inputs are held",
+            where="method",
+            expected="zoh",
+            got=method,
+        )
 
 
 def _numbers(value: ArrayLike | Mapping[str, float], what: str) -> Array | dict[str, float]:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from nmm.control.controller import Controller
 from nmm.control.sequencing.sequence import Schedule
 from nmm.control.step.quantities import QUANTITIES, saved
+from nmm.control.step.recorded import Recorded, room
 from nmm.model.robots.robot import Robot
 from nmm.motion.clearance import Swept, swept
 from nmm.motion.leg import Leg
@@ -27,23 +27,10 @@ def join(
     robot, stack = controller.robot, schedule.tasks
     parts = [leg.recorder.trajectory(dt, method) for leg in legs]
     rows = stack.rows(robot)
-    levels = sorted({task.priority for task in stack})
     first = np.cumsum([0, *(len(task.rows(robot)) for task in stack)])
+    record = joined_record(controller, schedule, legs)
     count = sum(map(len, parts))
-    sizes = {"N": count, "s": len(rows), "l": len(levels)}
-    arrays = {one.name: one.room(sizes) for one in saved() if one.shape in ("Ns", "Nl")}
-    ends = np.cumsum([0, *map(len, parts)])
-    for leg, part, here in zip(legs, parts, map(slice, ends, ends[1:]), strict=True):
-        on = np.flatnonzero(leg.active)
-        if not len(on) or not len(part):
-            continue
-        places = sorted({stack.tasks[i].priority for i in on})
-        columns: dict[str, Any] = {
-            "s": np.concatenate([np.arange(first[i], first[i + 1]) for i in on]),
-            "l": [levels.index(priority) for priority in places],
-        }
-        for name, whole in arrays.items():
-            whole[here, columns[QUANTITIES[name].shape[1]]] = part[name]
+    arrays = {one.name: getattr(record, one.name) for one in saved() if one.shape in ("Ns", "Nl")}
     # What is of the run as a whole is worked out anew: distances, and what is drawn.
     for one in saved():
         if one.name not in arrays and one.shape.startswith("N") and not one.optional:
@@ -86,6 +73,37 @@ def join(
         **({} if found is None else found.kept),
     )
     return joined, found
+
+
+def room_for(controller: Controller, count: int) -> Recorded:
+    """Room for `count` samples of all tasks' rows, active or not."""
+    tasks, robot = controller.given.task, controller.robot
+    n, m, *_, limited = controller.solver.sizes
+    return room(count, n, m, len(tasks.rows(robot)), len(tasks.levels(robot)), limited)
+
+
+def joined_record(controller: Controller, schedule: Schedule, legs: Sequence[Leg]) -> Recorded:
+    """The legs' samples as a record of all tasks' rows, NaN (-1) where a task is inactive."""
+    robot, stack = controller.robot, schedule.tasks
+    levels = sorted({task.priority for task in stack})
+    first = np.cumsum([0, *(len(task.rows(robot)) for task in stack)])
+    whole, begin = room_for(controller, sum(len(leg.recorder) for leg in legs)), 0
+    for leg in legs:
+        on, found = np.flatnonzero(leg.active), leg.recorder.so_far
+        here = begin + np.arange(len(leg.recorder))
+        begin += len(here)
+        places = sorted({stack.tasks[i].priority for i in on})
+        columns = {
+            "s": [k for i in on for k in range(first[i], first[i + 1])],
+            "l": [levels.index(priority) for priority in places],
+        }
+        for name, values in whole._asdict().items():
+            shape = QUANTITIES[name].shape[1:]
+            sizes = zip(shape, values.shape[1:], strict=True)
+            some = [np.array(columns.get(axis, range(size)), dtype=np.int64) for axis, size in sizes]
+            own = tuple(slice(len(each)) for each in some)  # without a task, a leg has a row of its own
+            values[np.ix_(here, *some)] = getattr(found, name)[:, *own]
+    return whole
 
 
 def row_names(robot: Robot, schedule: Schedule) -> tuple[str, ...]:

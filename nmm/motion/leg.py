@@ -48,8 +48,8 @@ class Leaving:
         """How many samples at times (N,), s, and q (N, n) belong to this leg."""
         return self.schedule.stays(times, q)
 
-    def changes(self, t: float, q: Array) -> bool:
-        """Whether the sample at t and q belongs to another leg."""
-        if self.schedule.changes(t, q):
+    def changes(self, t: float, q: Array, seen: Array) -> bool:
+        """Whether the sample at t and q, which the controller takes for `seen`, belongs to another leg."""
+        if self.schedule.changes(t, seen):
             self.q = q
         return self.q is not None

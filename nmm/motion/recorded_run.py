@@ -4,29 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import TypeAlias
 
 import numpy as np
 
 from nmm.base.arrays import Array
+from nmm.base.errors import InputError, RunError
 from nmm.base.findings import Finding
+from nmm.base.progress import between
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
-from nmm.control.integrators import Accelerated, Integrator
+from nmm.control.plant import Plant
 from nmm.control.standing_pose import standing_pose
 from nmm.control.step.idle_inputs import idle_inputs
 from nmm.model.robots.loading.ground import slip_warnings
 from nmm.model.robots.loading.provenance import provenance_of
-from nmm.motion.clearance import guarded
-from nmm.motion.closed_loop import drive_loop
-from nmm.motion.leg import Ended, Leaving
+from nmm.motion.closed_loop import drive_loop, finding_in
+from nmm.motion.leg import Ended, Leaving, Leg
 from nmm.motion.recording import Recorder
-from nmm.motion.verdict import FindingLine, Outcome
-
-#: Records a run over the times (N,) from q (n,), with progress and goal; returns how it ended.
-Drive: TypeAlias = Callable[
-    [Recorder, Array, Array, Callable[[float], None] | None, Goal | None], tuple[Outcome, FindingLine]
-]
+from nmm.motion.verdict import Outcome
 
 
 def sample_times(start: float, dt: float, steps: int, end: float) -> Array:
@@ -39,32 +34,24 @@ def sample_times(start: float, dt: float, steps: int, end: float) -> Array:
 
 def record_run(
     controller: Controller,
-    advance: Integrator,
+    plant: Plant,
     times: Array,
     q: Array,
-    progress: Callable[[float], None] | None,
+    progress: Callable[[float], None] | None = None,
     until: Goal | None = None,
     leg: Leaving | None = None,
     watch: Callable[[Recorder], None] | None = None,
-    disturbed: Drive | None = None,
+    recorder: Recorder | None = None,
 ) -> tuple[Recorder, Ended]:
-    """Integrate over the times (N,) from q; `watch` gets the recorder first. `disturbed` drives a robot that
-    does not do as it is told."""
-    recorder = Recorder(controller, times)
-    recorder.at_middle = advance.at_middle
+    """Run over the times (N,) from q; `watch` gets the recorder first, a new one unless given."""
+    recorder = Recorder(controller, times) if recorder is None else recorder
+    recorder.at_middle = plant.integrator.at_middle
     if watch is not None:
         watch(recorder)
-    if len(times) > 1 and not advance.tolerance:  # adaptive steps are shorter than the samples
+    if len(times) > 1 and not plant.integrator.tolerance:  # adaptive steps are shorter than the samples
         controller.dt = float(times[1] - times[0])
     recorder.findings += at_start(controller, q, times)
-    guarded_advance = guarded(advance, controller)
-    if controller.solver.second:
-        own = controller.solver
-        guarded_advance = Accelerated(advance, controller.robot, own.before, own.found.second.u_dot)
-    if disturbed is None:
-        outcome, reasons = drive_loop(controller, guarded_advance, recorder, times, q, progress, until, leg)
-    else:
-        outcome, reasons = disturbed(recorder, times, q, progress, until)
+    outcome, reasons = drive_loop(controller, plant, recorder, times, q, progress, until, leg)
     if controller.solver.second:
         recorder.findings += rate_jumps(recorder, follows=leg is not None and math.isfinite(leg.earlier))
     recorder.blocking = controller.report.blocking()
@@ -73,6 +60,46 @@ def record_run(
         recorder.counts = controller.safety_filter.counts
     last = recorder.q[len(recorder) - 1] if len(recorder) else q
     return recorder, Ended(outcome, reasons, last, controller.solver.derivatives[0].copy())
+
+
+def run_legs(
+    controller: Controller,
+    plant: Plant,
+    times: Array,
+    q: Array,
+    progress: Callable[[float], None] | None = None,
+    until: Goal | None = None,
+    watch: Callable[[Recorder], None] | None = None,
+) -> list[Leg]:
+    """The run of tasks that come and go, a leg for each set of active tasks from event to event; an event's
+    sample is the next leg's."""
+    legs: list[Leg] = []
+    schedule = controller.schedule
+    assert schedule is not None
+    controller.reset()
+    plant.begin(q)
+    schedule.changes(float(times[0]), plant.seen(0, q))
+    first, steps = 0, max(1, len(times) - 1)
+    while True:
+        try:
+            inner = controller.switch()
+        except RunError as error:
+            if not legs:
+                raise error.at("", InputError) from None
+            legs[-1].ended = legs[-1].ended._replace(outcome=Outcome.FAILED, reasons=(finding_in(error),))
+            return legs
+        leaving = Leaving(schedule, float(times[first - 1]) if first else -math.inf)
+        active, waiting = schedule.moment.active, schedule.sequence.waiting(schedule.moment)
+        share = between(progress, first / steps, 1.0 - first / steps)
+        goal = until if any(active) and not waiting else None
+        moved = plant.later(first)
+        recorder, ended = record_run(inner, moved, times[first:], q, share, goal, leaving, watch)
+        end = float(times[-1]) if leaving.q is None else float(times[first + len(recorder)])
+        recorder.goes_on = leaving.q is not None
+        legs.append(Leg(inner, active, plant.integrator, recorder, ended, end))
+        if leaving.q is None:
+            return legs
+        first, q = first + len(recorder), leaving.q
 
 
 #: A task's rate has jumped that changes by so many times what it changes by before and after,

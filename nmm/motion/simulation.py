@@ -8,24 +8,18 @@ from dataclasses import replace
 
 from numpy.typing import ArrayLike
 
-from nmm.base.arrays import Array, positive
-from nmm.base.errors import InputError, RunError, expect_kind
+from nmm.base.arrays import positive
+from nmm.base.errors import InputError, expect_kind
 from nmm.base.lazy_call import lazy_call
-from nmm.base.progress import between
-from nmm.base.text_format import listed
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
-from nmm.control.integrators import STEPPING, Integrator, integrator
-from nmm.control.sequencing.sequence import Schedule
-from nmm.motion.closed_loop import finding_in
-from nmm.motion.disturbances import Disturbances, Disturbed
-from nmm.motion.disturbed import check_disturbed, drive_disturbed
+from nmm.control.plant import UNDISTURBED, Plant, method_for
+from nmm.motion.disturbances import Disturbances, check_disturbed
 from nmm.motion.joining import join
-from nmm.motion.leg import Leaving, Leg
-from nmm.motion.recorded_run import Drive, record_run, sample_times
+from nmm.motion.leg import Leg
+from nmm.motion.recorded_run import record_run, run_legs, sample_times
 from nmm.motion.recording import Recorder
 from nmm.motion.trajectory import Trajectory
-from nmm.motion.verdict import FindingLine, Outcome
 
 #: The most samples that a run may have; beyond it the numbers do not fit in memory.
 MOST_SAMPLES = 20_000_000
@@ -76,7 +70,7 @@ def simulate(
     ------
     InputError : wrong q0 (also one outside limits that the controller does not keep, or with a joint that is
         not where the one that it follows has it), duration, dt, method; an `until` that is no Goal;
-        disturbances that are not known with the controller, the method or the goal
+        disturbances with a method that does not hold inputs
 
     Examples
     --------
@@ -102,91 +96,23 @@ def simulate(
             where="dt",
             expected=f"at most {MOST_SAMPLES}",
         )
-    if method == "adaptive" and controller.solver.samples:
-        raise InputError(
-            "limits, distances, a retreat and a step by Armijo's rule are kept from sample to sample",
-            where="method",
-            expected=listed(STEPPING, "or"),
-            got=method,
-        )
-    if controller.given.order == 2 and (
-        method == "zoh_midpoint" or (controller.limits is not None and method != "zoh")
-    ):
-        raise InputError(
-            "at order 2 what is held over a sample, and limits hold for, is its u_dot",
-            where="method",
-            expected="zoh",
-            got=method,
-        )
-    advance = integrator(method, robot, positive(tolerance, "tolerance"))
+    advance = method_for((controller,), method, positive(tolerance, "tolerance"))
     if controller.solver.scene is not None:
         controller.solver.scene.check_start(0.0, q)
     times = sample_times(0.0, dt, steps, duration)
     expect_kind(disturbances, Disturbances | None, "disturbances", "Disturbances, as Disturbances(slip=0.99)")
-    plant, drive = None if disturbances is None else disturbances.on(robot, dt), None
-    if plant is not None and plant.disturbs:
-        check_disturbed(plant, [controller], method, until)
-        drive = _disturbed(controller, method, plant.at(0, len(times)))
-    schedule = controller.schedule
+    disturbed = UNDISTURBED if disturbances is None else disturbances.on(robot, dt).at(0, len(times))
+    check_disturbed(disturbed, method)
+    plant, schedule = Plant(advance, disturbed), controller.schedule
     if schedule is not None:
-        legs = _legs(controller, schedule, advance, times, q, progress, until, watch)
+        legs = run_legs(controller, plant, times, q, progress, until, watch)
         run, found = join(controller, schedule, legs, dt, method)
         verdict = lazy_call("nmm.motion.diagnosis.diagnose:diagnose_legs")(
             controller, schedule, legs, run, found, until
         )
     else:
-        recorder, ended = record_run(controller, advance, times, q, progress, until, None, watch, drive)
+        recorder, ended = record_run(controller, plant, times, q, progress, until, None, watch)
         run = recorder.trajectory(dt, method)
         leg = Leg(controller, (), advance, recorder, ended, duration)
         verdict = lazy_call("nmm.motion.diagnosis.diagnose:diagnose")(leg, run, until)
     return replace(run, verdict=verdict)
-
-
-def _disturbed(controller: Controller, method: str, disturbed: Disturbed) -> Drive:
-    def drive(
-        recorder: Recorder,
-        times: Array,
-        q: Array,
-        progress: Callable[[float], None] | None,
-        until: Goal | None,
-    ) -> tuple[Outcome, FindingLine]:
-        return drive_disturbed(controller, method, recorder, times, q, disturbed, progress, until)
-
-    return drive
-
-
-def _legs(
-    controller: Controller,
-    schedule: Schedule,
-    advance: Integrator,
-    times: Array,
-    q: Array,
-    progress: Callable[[float], None] | None,
-    until: Goal | None,
-    watch: Callable[[Recorder], None] | None,
-) -> list[Leg]:
-    """The run, a leg for each set of active tasks from event to event; an event's sample is the next
-    leg's."""
-    legs: list[Leg] = []
-    controller.reset()
-    schedule.changes(float(times[0]), q)
-    first, steps = 0, max(1, len(times) - 1)
-    while True:
-        try:
-            inner = controller.switch()
-        except RunError as error:
-            if not legs:
-                raise error.at("", InputError) from None
-            legs[-1].ended = legs[-1].ended._replace(outcome=Outcome.FAILED, reasons=(finding_in(error),))
-            return legs
-        leaving = Leaving(schedule, float(times[first - 1]) if first else -math.inf)
-        active, waiting = schedule.moment.active, schedule.sequence.waiting(schedule.moment)
-        share = between(progress, first / steps, 1.0 - first / steps)
-        goal = until if any(active) and not waiting else None
-        recorder, ended = record_run(inner, advance, times[first:], q, share, goal, leaving, watch)
-        end = float(times[-1]) if leaving.q is None else float(times[first + len(recorder)])
-        recorder.goes_on = leaving.q is not None
-        legs.append(Leg(inner, active, advance, recorder, ended, end))
-        if leaving.q is None:
-            return legs
-        first, q = first + len(recorder), leaving.q

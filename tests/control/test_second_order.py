@@ -229,16 +229,14 @@ def test_what_is_not_known_at_order_2_is_refused() -> None:
         nmm.Controller(ROBOT, nmm.Task(nmm.Position("ee", "xy"), CIRCLE), nmm.ProjectedGradient(), order=3)
     with refused("collisions"):
         circling(collisions=nmm.Collisions(), dt=0.01)
-    with refused("step"):
+    with refused("step"):  # it has no objective to choose α by
         circling(nmm.ProjectedGradient(step="armijo"), dt=0.01)
     with refused("servo"):
         circling(limits=nmm.Limits(acceleration=1.0), dt=0.01, servo=200.0)
     with refused("method"):
         nmm.simulate(circling(limits=nmm.Limits(acceleration=1.0), dt=0.01), Q0, 1.0, 0.01)
-    with refused("order"):
-        nmm.rollout(circling(), Q0, 1.0, 0.01)
-    with refused("step"):
-        circling().step(0.0, Q0, 0.01)
+    with refused("method"):
+        circling(limits=nmm.Limits(acceleration=1.0), dt=0.01).step(0.0, Q0, 0.01)
     first = nmm.Controller(ROBOT, nmm.Task(nmm.Position("ee", "xy"), CIRCLE), nmm.ProjectedGradient())
     with refused("u"):
         first(0.0, Q0, np.zeros(4))

@@ -104,9 +104,6 @@ def test_rows_of_a_sweep_have_the_drift_of_their_runs() -> None:
         ({"disturbances.correct": 0}, "disturbances.correct"),
         ({"disturbances.odometry": False, "disturbances.correct": 1.0}, "disturbances.correct"),
         ({"method": "rk4"}, "method"),
-        ({"until": {"m": 0.1}}, "until"),
-        ({"collisions": True}, "disturbances"),
-        ({"order": 2}, "disturbances"),
     ],
 )
 def test_what_cannot_be_is_refused_at_its_key(keys: dict[str, object], where: str) -> None:

@@ -128,11 +128,11 @@ def bound_inputs(limits: LimitNumbers, q: Array, problem: ProblemArrays) -> None
 
 
 @compiled
-def gathers_speed(limits: LimitNumbers, problem: ProblemArrays, u: Array, count: int) -> bool:
+def gathers_speed(limits: LimitNumbers, problem: ProblemArrays, u: Array, count: int, share: float) -> bool:
     """Whether one of the first `count` inputs speeds up, held back by its limit of acceleration alone: then
-    its bounds are the largest fall and rise apart."""
+    its bounds are the largest fall and rise apart, over the share of u that is followed in a sample."""
     for j in range(count):
-        change = (limits.falling[j] + limits.rising[j]) * problem.dt[()]
+        change = (limits.falling[j] + limits.rising[j]) * problem.dt[()] / share
         lower, upper = problem.u_lower[j], problem.u_upper[j]
         alone = not math.isinf(change) and upper - lower >= change * (1.0 - ROUNDING)
         fastest = upper if u[j] > 0.0 else -lower

@@ -298,5 +298,5 @@ def watch_error(integers: Integers, floats: Array) -> bool:
     if e.retreat.durations.shape[0] == 0:
         return False
     platform = views(LaidOut, integers, floats, 0).buffers.G.shape[1]
-    speeds_up = gathers_speed(e.limits, e.problem, e.answer.u, platform)
+    speeds_up = gathers_speed(e.limits, e.problem, e.answer.u, platform, e.second.share[()])
     return bool(stalls(e.retreat, e.task.error, e.problem.dt[()], speeds_up))

@@ -71,15 +71,12 @@ def checked(given: Given) -> Given:
         raise InputError(where="order", expected="1, for inputs u, or 2, for u_dot", got=given.order)
     if given.order == 2:
         positive(given.servo, "servo")
-        step = getattr(given.resolver, "step", "constant")
-        there = {
-            "collisions": given.collisions,
-            "retreat": given.retreat,
-            f"resolver {given.resolver.name}: step": None if step == "constant" else step,
-        }
-        for name, one in there.items():
-            if one is not None:
-                raise InputError("is not known at order 2", where=name, expected="order 1, or none")
+        if given.collisions is not None:
+            raise InputError(
+                "distances are checked along motions whose inputs are held, and at order 2 inputs accelerate",
+                where="collisions",
+                expected="order 1, or no collisions",
+            )
     return given
 
 

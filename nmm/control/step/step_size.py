@@ -6,7 +6,7 @@ With u(α) the resolver's inputs and d = u(α) - u(0) the gradient's part, α is
     H(q + dt S d) <= H(q) + c dt h·d,   h = Sᵀ ∂H/∂q, h·d <= 0,
 
 and then holds through the sample's stages. u(α) is the resolver's own answer for that α: the task's share λ
-remains the resolver's decision and does not depend on α.
+remains the resolver's decision and does not depend on α. At order 2 u(α) is the answer that u follows.
 """
 
 import math
@@ -36,7 +36,8 @@ from nmm.control.functions.function import Function
 from nmm.control.functions.program import BESIDE, COMPILED, Buffers, LaidOut, Program, run_program
 from nmm.control.resolvers.answer import SINGULAR_J
 from nmm.control.resolvers.base import Resolver
-from nmm.control.step.equations import ControlStep, resolve
+from nmm.control.step.acceleration import follow_answer
+from nmm.control.step.equations import ControlStep, drive, resolve
 from nmm.model.robots.robot import Robot
 
 #: c: on a parabola the step is then at most 1.5 times that to the minimum.
@@ -146,7 +147,8 @@ def search(q: Array, integers: Integers, floats: Array, own_integers: Integers, 
         if e.answer.status[()] >= SINGULAR_J:
             return False
         keep(integers, floats, own.asked_integers, own.asked)
-        answered(e, own.u, own.q_dot)
+        copied(e.answer.u, own.u)
+        drive(own.u, views(LaidOut, integers, floats, 0).buffers.G, e.arm, own.q_dot)
         e.numbers[own.alpha_at] = 0.0
         resolve(q, integers, floats)
         answered(e, own.rest, own.resting)
@@ -163,6 +165,8 @@ def search(q: Array, integers: Integers, floats: Array, own_integers: Integers, 
         if falls(change, own.slope[()], ahead, ROUNDING * (own.size[()] + size)):
             if turn == 2:
                 put_back(integers, floats, own.asked_integers, own.asked)
+            elif e.second.u_dot.shape[0] > 0:
+                follow_answer(integers, floats)
             return False
         own.share[()] *= shorter(change, own.slope[()])
         e.numbers[own.alpha_at] = own.share[()] * own.whole[()]
@@ -170,6 +174,8 @@ def search(q: Array, integers: Integers, floats: Array, own_integers: Integers, 
         if turn == TRIALS + 1:
             e.numbers[own.alpha_at] = 0.0
             resolve(q, integers, floats)
+            if e.second.u_dot.shape[0] > 0:
+                follow_answer(integers, floats)
             return False
         answered(e, own.u, own.q_dot)
     dt = e.problem.dt[()]

@@ -215,12 +215,11 @@ class StepSolver:
         def again(q: Array) -> float:
             once(q, *blocks)
             if self._wanted is not None:
-                self._replace_by(self._wanted, q)
+                self._replace_by(self._wanted)
                 return float(Status.RELAXED)
             self._finished(q)
             if self.retreat_state is not None and self.retreat_state.now:
-                self._back_off(self.retreat_state, q)
-                self.before[:] = self.found.answer.u
+                self._replace_by(self._retreating(self.retreat_state, q))
             return float(self.found.answer.status[()])
 
         return again
@@ -231,8 +230,7 @@ class StepSolver:
         earlier = None if self.safety_filter is None else self.before.copy()
         status = self.solve_whole(t, q)
         if self.retreat_state is not None and self._watch_error(*self.blocks):
-            self._back_off(self.retreat_state, q)
-            self.before[:] = self.found.answer.u
+            self._replace_by(self._retreating(self.retreat_state, q))
         elif status >= FAILED:
             raise self.failure(t, q)
         if self.safety_filter is not None and earlier is not None:
@@ -246,7 +244,7 @@ class StepSolver:
         try:
             self.linearise(t, q)
             self.before[:] = earlier
-            self._replace_by(wanted, q)
+            self._replace_by(wanted)
             if self.safety_filter is not None:
                 self.safety_filter.certify(t, q, earlier)
         finally:
@@ -264,13 +262,15 @@ class StepSolver:
             for one, value in zip(returns, usual, strict=True):
                 one[()] = value
 
-    def _replace_by(self, wanted: Array, q: Array) -> None:
+    def _replace_by(self, wanted: Array, *, stage: bool = False) -> None:
+        """Inputs within the limits nearest to `wanted` (m,), at order 2 those at the sample's end, in place
+        of the resolver's."""
         if self.second:  # it follows its answer by this share within a sample
             wanted = self.before + (wanted - self.before) / self.found.second.share
-            self._replace_inputs(wanted, *self.blocks)
+        self._replace_inputs(wanted, *self.blocks)
+        if self.second:
             follow_answer(*self.blocks)
-        else:
-            self._replace_inputs(wanted, *self.blocks)
+        elif not stage:
             self.before[:] = self.found.answer.u
 
     def load_stop(self) -> None:
@@ -300,7 +300,7 @@ class StepSolver:
         try:
             failed = self.solve(t, q) >= FAILED
             if self.retreat_state is not None and self.retreat_state.now:
-                self._back_off(self.retreat_state, q)
+                self._replace_by(self._retreating(self.retreat_state, q), stage=True)
             elif failed:
                 raise self.failure(t, q)
         finally:
@@ -325,10 +325,8 @@ class StepSolver:
         if self.found.limits.mode == SAMPLE:
             self.before[:] = held
 
-    def _back_off(self, retreat_state: RetreatState, q: Array) -> None:
-        """Replace the resolver's inputs by the retreat's."""
-        G = self.program.buffers.G
-        self._replace_inputs(retreat_state.inputs(q, G, self.found.problem), *self.blocks)
+    def _retreating(self, retreat_state: RetreatState, q: Array) -> Array:
+        return retreat_state.inputs(q, self.program.buffers.G, self.found.problem)
 
     def begin_run(self) -> None:
         """A run begins: nothing is remembered, and numbers that runs replace are the first ones."""

@@ -158,7 +158,7 @@ def advance(
     e = views(ControlStep, integers, floats, BESIDE)
     status = float(call_step(e.step, t, q, integers, floats))
     for j in range(u.shape[0]):
-        u[j] = e.answer.u[j]
+        u[j] = e.problem.before[j] if e.second.u_dot.shape[0] > 0 else e.answer.u[j]
     if status >= SINGULAR_J:
         return status
     if method.weights.shape[0] < 2:  # no stages besides the sample

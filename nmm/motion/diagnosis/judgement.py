@@ -15,6 +15,7 @@ import numpy as np
 from nmm.base.findings import Finding
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
+from nmm.control.plant import Plant
 from nmm.model.robots.wheel_slip import sideways_speeds
 from nmm.motion.diagnosis import reasons
 from nmm.motion.diagnosis.assessment import Assessment, Instability, assess
@@ -111,7 +112,7 @@ class Trials:
         steps = min(most, max(1, math.ceil((self._end - start) / dt - 1e-9)))
         times = sample_times(start, dt, steps, self._end)
         try:
-            tried, ended = record_run(controller, self._integrator, times, self._q[first], None)
+            tried, ended = record_run(controller, Plant(self._integrator), times, self._q[first])
             again = assess(controller, tried, self._integrator, dt)
         except Exception:  # a user's function may raise anything, where it was not made for
             return None, []

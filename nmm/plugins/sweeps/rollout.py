@@ -20,12 +20,13 @@ from nmm.base.errors import InputError, expect, no_such
 from nmm.base.findings.run import line
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
-from nmm.control.integrators import Integrator, integrator
-from nmm.motion.clearance import guarded
+from nmm.control.integrators import Integrator
+from nmm.control.plant import Plant, method_for
+from nmm.control.step.recorded import Recorded
 from nmm.motion.closed_loop import drive_loop
-from nmm.motion.disturbances import Disturbances, Plant
-from nmm.motion.disturbed import check_disturbed, drive_disturbed
-from nmm.motion.recorded_run import sample_times
+from nmm.motion.disturbances import Disturbances, Disturbing, check_disturbed
+from nmm.motion.joining import joined_record, room_for
+from nmm.motion.recorded_run import run_legs, sample_times
 from nmm.motion.recording import Recorder
 from nmm.motion.simulation import MOST_SAMPLES
 from nmm.motion.verdict import Outcome
@@ -115,7 +116,7 @@ def rollout(
     Raises
     ------
     InputError : no runs, wrong shapes, a q0 outside limits that the controller does not keep; more to keep
-        than there is memory for; tasks that come and go, which only `simulate` runs
+        than there is memory for
 
     Examples
     --------
@@ -154,17 +155,15 @@ def rollout(
     expect(steps <= MOST_SAMPLES, "dt", f"at most {MOST_SAMPLES} samples", dt)
     starts = checked_starts(controllers, q0)
     count = len(starts)
-    plant = (disturbances or Disturbances()).on(robot, dt, count)
-    if plant.disturbs:
-        check_disturbed(plant, controllers, method, until)
-    sampled = any(one.solver.samples for one in controllers)
-    expected = "rk4, midpoint, euler, zoh or zoh_midpoint with limits"
-    expect(not (sampled and method == "adaptive"), "method", expected, method)
+    disturbing = (disturbances or Disturbances()).on(robot, dt, count)
+    method_for(controllers, method)
+    check_disturbed(disturbing.at(0, 1), method)
     times = sample_times(0.0, dt, steps, duration)
     where = None if folder is None else Path(folder)
     every = counted(every, "every")
-    kept = Kept(keep, times, every, count, Recorder(controllers[0], times).found, where)
-    runs = _Runs(controllers, starts, times, method, until, plant, kept)
+    Recorder(controllers[0], times)  # `InputError` where there is no memory for one
+    kept = Kept(keep, times, every, count, room_for(controllers[0], len(times)), where)
+    runs = _Runs(controllers, starts, times, method, until, disturbing, kept)
     workers = min(counted(cores() if threads is None else threads, "threads"), count)
     rooms: dict[str, Array] = {}
     with ThreadPoolExecutor(workers) as pool:
@@ -201,7 +200,7 @@ class _Runs:
     times: Array
     method: str
     until: Goal | None
-    plant: Plant
+    disturbing: Disturbing
     kept: Kept
 
     def __post_init__(self) -> None:
@@ -211,27 +210,49 @@ class _Runs:
         self.samples: Integers = np.zeros(count, dtype=np.int64)
         self.outcome, self.message = [""] * count, [""] * count
 
-    def one(self, i: int, room: dict[str, Array], row: int) -> None:
+    def one(self, i: int, kept: dict[str, Array], row: int) -> None:
         if self.stop.is_set():
             return
         controller, recorder, advance = self._controller(i)
-        start = self.starts[i].copy()
-        disturbed = self.plant.at(i, len(self.times)) if self.plant.disturbs else None
-        if disturbed is not None:
-            given = controller, self.method, recorder, self.times, start, disturbed
-            outcome, reasons = drive_disturbed(*given, until=self.until)
+        plant = Plant(advance, self.disturbing.at(i, len(self.times)))
+        start, schedule = self.starts[i].copy(), controller.schedule
+        if schedule is None:
+            outcome, why = drive_loop(controller, plant, recorder, self.times, start, until=self.until)
+            found, reached, why = recorder.found, _at_goal(recorder, self.until), (*why, *recorder.noticed())
         else:
-            outcome, reasons = drive_loop(controller, advance, recorder, self.times, start, None, self.until)
-        count = len(recorder)
-        believed = recorder.believed
-        self.kept.put(room, row, recorder.found, believed, count)
-        measure(self.times, count, recorder.found, self.measures[i])
-        if count:
-            away = np.zeros(2) if believed is None else (believed - recorder.found.q)[count - 1, :2]
-            self.measures[i, MEASURES.index("drift")] = np.hypot(*away)
+            legs = run_legs(controller, plant, self.times, start, None, self.until)
+            recorder = legs[-1].recorder
+            outcome, why, *_ = legs[-1].ended
+            why = (*why, *(one for leg in legs for one in leg.recorder.findings if one not in why))
+            found = joined_record(controller, schedule, legs)
+            waits = schedule.sequence.waiting(schedule.settle()) or not any(legs[-1].active)
+            reached = not waits and _at_goal(recorder, self.until)
+        count = len(recorder) if schedule is None else len(found.q)
+        believed = plant.disturbed.believed if len(plant.disturbed.believed) else None
+        self.kept.put(kept, row, found, believed, count)
+        self._measure(i, found, believed, count, [] if schedule is None else [leg.recorder for leg in legs])
         self.samples[i] = count
-        why = (*reasons, *recorder.noticed())
-        self.outcome[i], self.message[i] = _ended(outcome, recorder, self.until, controller), line(why)
+        ended = "ended" if self.until is None else "reached" if reached else "missed"
+        self.outcome[i] = ended if outcome is Outcome.COMPLETED else str(outcome)
+        self.message[i] = line(why)
+
+    def _measure(
+        self, i: int, found: Recorded, believed: Array | None, count: int, legs: Sequence[Recorder]
+    ) -> None:
+        """The measures of run i; `legs` where tasks come and go, whose rows count while they are active."""
+        if legs:
+            known = {"error": 0.0, "scale": 1.0, "J": 0.0, "residual": 0.0}
+            filled = {name: np.nan_to_num(getattr(found, name), nan=x) for name, x in known.items()}
+            found = found._replace(**filled)
+        measure(self.times, count, found, self.measures[i])
+        if legs:
+            each, sigma_min = np.zeros((len(legs), len(MEASURES))), MEASURES.index("sigma_min")
+            for own, leg in zip(each, legs, strict=True):
+                measure(leg.t, len(leg), leg.found, own)
+            self.measures[i, sigma_min] = np.nanmin(each[:, sigma_min], initial=np.inf)
+        if count:
+            away = np.zeros(2) if believed is None else (believed[count - 1] - found.q[count - 1])[:2]
+            self.measures[i, MEASURES.index("drift")] = np.hypot(*away)
 
     def _controller(self, i: int) -> tuple[Controller, Recorder, Integrator]:
         """This thread's own controller, with room for its samples, and the integrator."""
@@ -242,32 +263,28 @@ class _Runs:
         controller = copy.copy(self.controllers[i if len(self.controllers) > 1 else 0])
         if controller.solver.samples:
             controller.dt = float(self.times[1] - self.times[0])
-        advance = guarded(integrator(self.method, controller.robot, 1e-9), controller)
+        advance = method_for((controller,), self.method)
         self._local.ready = controller, Recorder(controller, self.times), advance
         return self._local.ready
 
 
 def _check(controllers: Sequence[Controller]) -> None:
     """`InputError` for controllers whose runs cannot stand beside each other."""
-    if any(one.schedule is not None for one in controllers):
-        raise InputError("tasks that come and go are run by simulate alone", where="rollout")
     made = controllers and all(isinstance(one, Controller) for one in controllers)
     expect(made, "rollout", "a controller, a scenario or a list of controllers")
-    if any(one.order == 2 for one in controllers):
-        raise InputError("rollouts are not known at order 2", where="order", expected="1, or nmm.simulate")
     first = controllers[0]
     for k, one in enumerate(controllers):
         same = one.robot.q_names == first.robot.q_names and one.robot.u_names == first.robot.u_names
-        if not same or len(one.rows) != len(first.rows):
+        rows = len(one.given.task.rows(one.robot)) == len(first.given.task.rows(first.robot))
+        if not (same and rows):
             raise InputError("another robot or other rows than the first", where=f"rollout: controller {k}")
 
 
-def _ended(outcome: Outcome, recorder: Recorder, until: Goal | None, controller: Controller) -> str:
-    if outcome is not Outcome.COMPLETED:
-        return str(outcome)
-    if until is None:
-        return "ended"
-    return "reached" if until.reached(recorder.so_far.error[-1], controller.rows) else "missed"
+def _at_goal(recorder: Recorder, until: Goal | None) -> bool:
+    """Whether a run's last sample is at its goal."""
+    if until is None or not len(recorder):
+        return False
+    return until.reached(recorder.so_far.error[-1], recorder.controller.rows)
 
 
 def checked_starts(controllers: Sequence[Controller], q0: Start) -> Array:

@@ -240,7 +240,6 @@ def test_the_same_controller_may_stand_there_twice() -> None:
         ({"folder": "nowhere"}, "folder"),
         ({"threads": -1}, "threads"),
         ({"disturbances": nmm.Disturbances(0.1)}, "method"),
-        ({"disturbances": nmm.Disturbances(0.1), "method": "zoh", "until": nmm.Goal(m=0.1)}, "until"),
         ({"disturbances": nmm.Disturbances(slip=[1.0, 2.0]), "method": "zoh"}, "slip"),
         ({"disturbances": nmm.Disturbances(slip={"w": 0.5}), "method": "zoh"}, "slip"),
         ({"disturbances": nmm.Disturbances(odometry=True)}, "method"),
@@ -278,10 +277,18 @@ def test_what_does_not_fit_in_memory_is_asked_before(monkeypatch: pytest.MonkeyP
     assert len(nmm.rollout(controller(), starts(2), 0.1, 0.01)) == 2  # measures alone need none
 
 
-def test_tasks_that_come_and_go_are_left_to_simulate() -> None:
-    scenario = nmm.Scenario.load("unicycle_3r_sequence")
-    with refused("rollout"):
-        nmm.rollout(scenario)
+def test_tasks_that_come_and_go_are_those_of_simulate_to_the_bit() -> None:
+    """Each row while its task is active, not a number else."""
+    scenario = nmm.Scenario.load("unicycle_3r_sequence", {"duration": 6.0})
+    run = scenario.run()
+    kept = ("q", "u", "r", "error", "scale")
+    found = nmm.rollout(scenario, [scenario.parts.q0] * 2, keep=kept, threads=2)
+    for name in kept:
+        for one in range(2):
+            np.testing.assert_array_equal(found[name][one, : len(run)], run[name], err_msg=name)
+    np.testing.assert_allclose(found["sigma_min"], run.sigma_min.min(), rtol=1e-9)
+    np.testing.assert_allclose(found["error_final"], run.error_norm[-1], rtol=1e-12)
+    assert found.samples.tolist() == [len(run)] * 2
 
 
 def test_controllers_that_do_not_fit_together_are_refused() -> None:
