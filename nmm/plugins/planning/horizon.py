@@ -19,6 +19,7 @@ from nmm.control.limits.limits import Limits
 from nmm.model.collisions.obstacle import shifts
 from nmm.model.robots.joint_table import as_row
 from nmm.model.robots.robot import Robot
+from nmm.motion.disturbances import Disturbances
 from nmm.motion.trajectory import Outcome, Trajectory
 from nmm.motion.verdict import Verdict
 from nmm.plugins.planning.collisions.motion_check import MotionCheck
@@ -100,6 +101,12 @@ class Horizon:
         samples: int = 20,
     ) -> None:
         expect_kind(goal, Task | Mapping | Plan, "horizon: goal", "a Task, coordinates by name or a Plan")
+        if isinstance(goal, Task) and goal.when:
+            raise InputError(
+                "a horizon has one task for all the time ahead, and this one begins or ends",
+                where="horizon: goal",
+                expected="a task without when",
+            )
         limits = Limits() if limits is None else limits
         if limits.bounds:
             raise InputError("limits of functions are not looked at ahead", where="horizon: limits")
@@ -172,10 +179,15 @@ class Horizon:
         return self._ahead(t + self.dt, here)[1][0]
 
     def run(
-        self, q0: ArrayLike | Mapping[str, float], duration: float, until: Goal | None = None
+        self,
+        q0: ArrayLike | Mapping[str, float],
+        duration: float,
+        until: Goal | None = None,
+        disturbances: Disturbances | None = None,
     ) -> Trajectory:
         """The closed loop from q0 at t = 0, inputs linear within samples: until the task's error is within
-        tolerances, or over all of `duration`, s. Samples without a motion are told (`horizon_unsolved`)."""
+        tolerances, or over all of `duration`, s. Samples without a motion are told (`horizon_unsolved`).
+        With `disturbances` the robot does otherwise than it is told; their samples are dt apart."""
         robot = self.robot
         q = [robot.following.placed(robot.q(q0))]
         robot.check_limits(q[0])
@@ -185,12 +197,17 @@ class Horizon:
         parts = max(1, round(self.dt / SHOWN))
         t, u, unsolved, reached = [0.0], [np.zeros(robot.n_u)], [], False
         last = positive(duration, "duration") - 1e-9
+        plant = None if disturbances is None else disturbances.plant(robot, self.dt)
+        plant = plant if plant is not None and plant.disturbs else None
         while t[-1] < last and not reached:
-            self(t[-1], q[-1])
+            seen = q[-1] if plant is None else plant.see(q[-1])
+            self(t[-1], seen)
             if not self.solved:
                 unsolved.append(t[-1])
             times = t[-1] + self.dt * np.arange(1, parts + 1) / parts
-            there, inputs = self._ahead(times, q[-1])
+            there, inputs = self._ahead(times, seen)
+            if plant is not None:
+                there = plant.go_on(robot, q[-1], u[-1], (inputs[-1] - u[-1]) / self.dt, times - t[-1])
             t, q, u = [*t, *times.tolist()], [*q, *there], [*u, *inputs]
             sizes = error_sizes(self._error.evaluate(q[-1], t[-1])[2], self._error.rows)
             reached = until is not None and sizes[0] <= until.m and sizes[1] <= until.rad
