@@ -8,21 +8,40 @@ import numpy as np
 
 from nmm.base.arrays import Array
 from nmm.control.controller import Controller
+from nmm.control.step.step_solver import StepSolver
 
 
 class LoopInputs:
-    """u (m,), the last inputs: the controller's, a share of them, held ones or a stop's, within limits."""
+    """u (m,), the last inputs: the controller's, a share of them, held ones or a stop's, within limits; at
+    order 2 those that accelerations lead to in a period."""
 
     def __init__(self, controller: Controller, period: float) -> None:
-        self._controller, self._solver, self._period = controller, controller.solver, period
-        self._earlier = self._solver.before.copy()
+        self._controller, self._period = controller, period
+        self._earlier, self._q = self._solver.before.copy(), controller.robot.rest
         self.u = np.zeros(controller.robot.n_u)
+
+    @property
+    def _solver(self) -> StepSolver:
+        """That of the tasks that are active now."""
+        return self._controller.solver
+
+    def _accept(self) -> None:
+        """The inputs that the solver has just computed become u."""
+        solver, second = self._solver, self._solver.found.second
+        if not solver.second:
+            self.u = solver.found.answer.u.copy()
+            return
+        self.u = solver.before + self._period * second.u_dot
+        if np.isfinite(self.u).all():
+            self._write(self.u, self._q)
 
     def compute(self, t: float, q: Array) -> str:
         """Those of the controller at (t, q); what it raised where it has none, and then all is as before."""
         self._earlier[:] = self._solver.before
+        self._q = q
         try:
-            self.u = self._controller(t, q)
+            self._controller(t, q)
+            self._accept()
         except Exception as error:  # a user's function may raise anything
             self._solver.before[:] = self._earlier
             return type(error).__name__
@@ -49,9 +68,10 @@ class LoopInputs:
         """Inputs that the solver brings within the limits; where a function of the user raises, what limits
         of acceleration allow towards rest."""
         earlier = self._solver.before.copy()
+        self._q = q
         try:
             take()
-            self.u = self._solver.found.answer.u.copy()
+            self._accept()
         except Exception:
             self.u = np.full_like(earlier, np.nan)
         if not np.isfinite(self.u).all():
@@ -63,4 +83,5 @@ class LoopInputs:
         solver = self._solver
         self.u = u.copy()
         solver.found.answer.u[:] = solver.before[:] = u
+        solver.found.second.u_dot[:] = 0.0
         solver.found.q_dot[:] = solver.robot.S(q) @ u

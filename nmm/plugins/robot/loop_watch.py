@@ -32,7 +32,6 @@ class LoopWatch:
         share = math.inf if outside is None else scalar(outside, "outside", least=0.0)
         self._far = FarLimits(controller.robot, solver.limits_on.coordinates, share)
         self._error = None if error is None else tuple(positive(most, "error") for most in error)
-        self._units = unit_codes(solver.rows)
         self._controller, self._found = controller, found
         self._free_at = 0.0
         self.refused: Counter[str] = Counter()
@@ -66,7 +65,8 @@ class LoopWatch:
         """Whether the task error is larger than it may be."""
         if self._error is None:
             return False
-        m, rad = norms(self._controller.solver.found.task.error, self._units)
+        solver = self._controller.solver
+        m, rad = norms(solver.found.task.error, unit_codes(solver.rows))
         off = m > self._error[0] or rad > self._error[1]
         if off:
             self._found.add("off_task", t, m=m, rad=rad)

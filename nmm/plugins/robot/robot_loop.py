@@ -34,7 +34,7 @@ class Loop:
 
     Parameters
     ----------
-    controller : of order 1, of tasks that do not come and go; what limits it has, a stop keeps
+    controller : what limits it has, a stop keeps; at order 2 u is what accelerations lead to in a period
     period : s, between two calls; the controller's dt unless given, and then that, too
     watchdog : s, from the time of the last measurement used until the loop stops, and from one call to the
         next
@@ -58,7 +58,7 @@ class Loop:
 
     Raises
     ------
-    InputError : a controller of order 2 or of tasks that come and go; no period; numbers that are not above 0
+    InputError : no period; numbers that are not above 0
 
     Examples
     --------
@@ -93,8 +93,6 @@ class Loop:
         error: tuple[float, float] | None = None,
         keep: int = 10_000,
     ) -> None:
-        if controller.order != 1 or controller.schedule is not None:
-            raise InputError(where="controller", expected="of order 1, with tasks that are always active")
         period = controller.dt if period is None else period
         if period is None:
             raise InputError(where="period", expected="a number, s, or a controller with dt", got=None)

@@ -334,9 +334,6 @@ def test_bad_input_is_told() -> None:
     ):
         with pytest.raises(nmm.InputError):
             nmm.Loop(controller, **given)  # type: ignore[arg-type]
-    second = nmm.Controller(robot, task, nmm.ProjectedGradient(), order=2)
-    with pytest.raises(nmm.InputError, match="order 1"):
-        nmm.Loop(second, 0.01)
     loop = nmm.Loop(controller, 0.01)
     assert not loop.step(0.0, [1.0, 2.0]).any()  # of a wrong length
     assert not loop.step(0.01, "nonsense").any()  # type: ignore[arg-type]
@@ -395,3 +392,38 @@ def test_each_code_has_its_sentence() -> None:
     for reason in Refused:
         values = {"reason": str(reason), "samples": 1, "end": 1.5}
         assert str(Finding("measurement_refused", values, {"t": 1.5}))
+
+
+def test_at_order_2_it_gives_the_inputs_that_accelerations_lead_to_and_stops() -> None:
+    robot = nmm.load("unicycle_2r")
+    task = nmm.Task(nmm.Position("ee", "xy"), [1.4, 0.5])
+    limits = nmm.Limits({"v": 0.5, "omega": 1.0}, acceleration=2.0)
+    controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=limits, order=2)
+    loop, q, hold, given = nmm.Loop(controller, 0.01), robot.q({"q2": 0.5}), HeldInputs(robot), []
+    for k in range(500):
+        given.append(loop.step(0.01 * k, q))
+        q = hold(q, given[-1], 0.01)
+    assert loop.state is nmm.LoopState.RUNNING
+    assert np.linalg.norm(controller.evaluate(5.0, q).error) < 0.05
+    loop.stop()
+    while loop.state is not nmm.LoopState.STOPPED:
+        k += 1
+        given.append(loop.step(0.01 * k, q))
+        q = hold(q, given[-1], 0.01)
+    assert np.abs(np.diff([np.zeros(robot.n_u), *given], axis=0)).max() < 2.0 * 0.01 + 1e-9
+    assert not given[-1].any()
+
+
+def test_of_tasks_that_begin_and_end_it_has_the_rows_while_they_are_there() -> None:
+    robot = nmm.load("unicycle_2r")
+    reach = nmm.Task(nmm.Position("ee", "xy"), [1.4, 0.5], name="reach")
+    aim = nmm.Task(nmm.Posture("q1"), [0.5], name="aim", priority=2, when=nmm.Between(0.1, 0.2))
+    controller = nmm.SequencedController(robot, [reach, aim], nmm.ProjectedGradient())
+    loop, q, hold = nmm.Loop(controller, 0.01, keep=25), robot.q({"q2": 0.5}), HeldInputs(robot)
+    for k in range(40):
+        q = hold(q, loop.step(0.01 * k, q), 0.01)
+    run = loop.trajectory()
+    assert len(run) == 25
+    np.testing.assert_allclose(run.t, 0.01 * np.arange(15, 40))
+    np.testing.assert_array_equal(np.isfinite(run.error[:, 2]), run.t < 0.2 - 1e-9)
+    assert [event.what for event in run.events] == ["begins", "ends"]
