@@ -254,9 +254,15 @@ def test_it_stands_still_and_says_why_until_it_is_told_otherwise() -> None:
     moved(driven, 0.1)
 
 
-def test_tasks_that_come_and_go_are_refused() -> None:
-    with pytest.raises(InputError, match="unicycle_3r_sequence: has tasks that come and go"):
-        scenario("unicycle_3r_sequence")
+def test_tasks_that_come_and_go_have_curves_while_they_are_there() -> None:
+    driven = Driven(scenario("unicycle_3r_sequence"))
+    counts = [len(target.rows) for target in driven.targets]
+    moved(driven, 0.1)
+    look = driven.look()
+    assert look.step.error.shape == look.step.r_d.shape == (sum(counts),)
+    on = np.repeat(driven.reacting.schedule.moment.active, counts)
+    np.testing.assert_array_equal(np.isfinite(look.step.error), on)
+    assert 0 < on.sum() < len(on)
 
 
 @pytest.mark.parametrize(
@@ -647,7 +653,6 @@ def test_only_its_own_page_is_listened_to(tmp_path: Path) -> None:
 def test_bad_input_is_a_line(capfd: pytest.CaptureFixture[str]) -> None:
     for arguments, words in (
         (["nothing_like_it"], "unknown robot or scenario"),
-        (["unicycle_3r_sequence"], "tasks that come and go"),
         (["unicycle_2r", "--task", "position:nowhere"], "nowhere"),
         (["unicycle_3r_position", "--port", "99999"], "from 1 to 65535"),
     ):

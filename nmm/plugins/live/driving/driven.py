@@ -30,9 +30,9 @@ NEAR = 5e-3
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """The robot at t, s since the beginning: the controller's step, σ_min of J, the frames of the tasks and
-    things (targets, 3), m in the world, NaN for those without one, and what keeps it from its targets ("" if
-    nothing does)."""
+    """The robot at t, s since the beginning: the controller's step (error and r_d of all tasks, NaN while one
+    is inactive), σ_min of J, the frames of the tasks and things (targets, 3), m in the world, NaN for those
+    without one, and what keeps it from its targets ("" if nothing does)."""
 
     t: float
     step: Step
@@ -132,6 +132,8 @@ class Driven:
         self.shown.stand(self.q)
         self.reacting.reset()
         self._led, self._since, self.u = self.reacting, 0.0, np.zeros(self.robot.n_u)
+        disturbances = self.setup.disturbances
+        self._plant = None if disturbances is None else disturbances.plant(self.robot, self.setup.dt)
         self.trouble = ""
 
     @property
@@ -168,7 +170,7 @@ class Driven:
     def aim_here(self) -> None:
         """Aim each task at the value that it has now."""
         here = Configuration(self.robot, self.q)
-        for number, task in enumerate(self.reacting.task):
+        for number, task in enumerate(self.reacting.given.task):
             self.aim(number, evaluate(task.function, 0.0, here).value)
 
     def with_choice(self, key: str, value: object) -> Made:
@@ -188,7 +190,9 @@ class Driven:
         if self.trouble:
             return False
         try:
-            q_next, self.u = self._led.step(self.elapsed, self.q, self.setup.dt)
+            held = self._plant is not None or (self._led.order == 2 and self._led.limits is not None)
+            given = self.elapsed, self.q, self.setup.dt, "zoh" if held else "rk4"
+            q_next, self.u = self._led.step(*given, plant=self._plant)
         except NmmError as error:
             self.trouble = str(error)
             return False
@@ -197,6 +201,11 @@ class Driven:
             return False
         self.t, self.q = self.t + self.setup.dt, q_next
         return True
+
+    def _active(self) -> tuple[bool, ...]:
+        """Whether each of the tasks is active."""
+        schedule = self.reacting.schedule
+        return (True,) * len(self.targets) if schedule is None else schedule.moment.active
 
     def look(self) -> Look:
         """The present place and what the controller finds there; wheels have rolled since the last look."""
@@ -210,11 +219,16 @@ class Driven:
                 at[i] = here.placement(target.frame).translation if on_robot else here.center_of_mass()[0]
         known = bool(np.all(np.isfinite(step.J)))
         sigma = np.linalg.svd(step.J, compute_uv=False).min(initial=math.inf) if known else math.nan
-        wanted = np.concatenate([target.signal.value for target in self.targets])
-        against = ""
-        if self._led is self.reacting:
+        against, on = "", self._active()
+        if self._led is self.reacting and any(on):
+            shown = zip(self.targets, on, strict=True)
+            wanted = np.concatenate([target.signal.value for target, active in shown if active])
             against = self._reaching.words(self.reacting, self.t, step, wanted)
-        else:
+        if self._led is not self.reacting:
             led = self._led.evaluate(self.elapsed, self.q)
             step = replace(step, u=led.u, q_dot=led.q_dot, scale=led.scale)
+        rows = np.repeat(on, [len(target.rows) for target in self.targets])
+        every = np.full((2, len(rows)), np.nan)
+        every[:, rows] = step.error[: rows.sum()], step.r_d[: rows.sum()]
+        step = replace(step, error=every[0], r_d=every[1])
         return Look(self.t, step, float(sigma), at, against)

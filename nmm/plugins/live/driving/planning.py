@@ -191,7 +191,7 @@ def on_floor(q: Array) -> Array:
 
 def made_for(controller: Controller, q: Array, number: int, target: LiveTarget, dt: float) -> Made:
     """A plan from q to a target of a controller's task, with its limits and distances, and its follower."""
-    given, task = controller.given, controller.task.tasks[number]
+    given, task = controller.given, controller.given.task.tasks[number]
     kept: dict[str, Any] = {"collisions": given.collisions, "limits": given.limits, "margin": MARGIN}
     found = plan(given.robot, q, Task(task.function, target), seconds=SECONDS, **kept)
     reference = found.reference(tube=FARTHEST)

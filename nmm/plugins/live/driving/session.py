@@ -142,7 +142,7 @@ class DriveSession(RobotSession):
         self._choices: tuple[int, list[Choice]] = (0, driven.choices)
         self._picture: tuple[list[str], dict[str, Any]] | None = None
         first = driven.reacting
-        self._seen = SeenPoints(first.task, first.limits, driven.robot, live=True)
+        self._seen = SeenPoints(first.given.task, first.limits, driven.robot, live=True)
         targets = Drawing()
         targets.add(
             "targets",
@@ -320,7 +320,7 @@ class DriveSession(RobotSession):
     def _values(self, look: Look) -> list[float | None]:
         step = look.step
         known: dict[str, Iterable[float]] = {
-            "error_norm": [float(np.linalg.norm(step.error))],
+            "error_norm": [float(np.sqrt(np.nansum(step.error**2)))],
             "error": step.error,
             "objective": [step.objective],
             "sigma_min": [look.sigma_min],

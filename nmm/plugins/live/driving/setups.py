@@ -25,6 +25,7 @@ from nmm.control.resolvers.base import Resolver
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.surroundings import NO_SURROUNDINGS, Surroundings
+from nmm.motion.disturbances import Disturbances
 from nmm.scenario import Scenario
 from nmm.scenario.resolvers import RESOLVER_PARTS
 
@@ -100,6 +101,7 @@ class DriveSetup(ABC):
     name : the scenario's or the robot's
     at_robot : whether targets begin where the robot is, not where references are
     surroundings : what the robot carries, and scenery
+    disturbances : what it does otherwise than it is told
 
     Examples
     --------
@@ -114,6 +116,7 @@ class DriveSetup(ABC):
     dt: float
     at_robot: bool
     surroundings: Surroundings = NO_SURROUNDINGS
+    disturbances: Disturbances | None = None
 
     @abstractmethod
     def controller(self, settings: Settings) -> Controller:
@@ -125,15 +128,11 @@ class DriveSetup(ABC):
 
 
 class ScenarioSetup(DriveSetup):
-    """A scenario whose references are left aside, but for where they begin.
+    """A scenario whose references are left aside, but for where they begin; a retreat can be chosen.
 
     Parameters
     ----------
     q0 : (n,) where it begins, m and rad; the scenario's start when not given
-
-    Raises
-    ------
-    InputError : tasks that come and go
 
     Examples
     --------
@@ -153,14 +152,8 @@ class ScenarioSetup(DriveSetup):
         self.robot = scenario.robot()
         self.surroundings = scenario.surroundings(self.robot)
         self.q0, self.dt = self.robot.q(scenario.parts.q0 if q0 is None else q0), scenario.parts.dt
-        if scenario.parts.order == 2:
-            raise InputError("cannot be driven at order 2", where=scenario.name, expected="order: 1")
-        if any(part.when for part in scenario.parts.task):
-            raise InputError(
-                "has tasks that come and go (when), which cannot be driven",
-                where=scenario.name,
-                expected="a scenario whose tasks are always there",
-            )
+        if scenario.parts.disturbances is not None:
+            self.disturbances = scenario.parts.disturbances.make()
 
     def controller(self, settings: Settings) -> Controller:
         controller = self._with(settings).controller()
@@ -177,6 +170,9 @@ class ScenarioSetup(DriveSetup):
         if _is_number(alpha) and alpha > 0.0:
             found.append(self._number("resolver.alpha", "step α along −∇H", RESOLVER, alpha))
         found.append(Choice("limits", "keep the limits", RESOLVER, parts.limits is not None))
+        if self.scenario.parts.retreat is not None:
+            chosen = parts.retreat is not None
+            found.append(Choice("retreat", "back off where the error stalls", RESOLVER, chosen))
         for i, task in enumerate(parts.task):
             gain = task.model_dump().get("gain")
             if _is_number(gain):
@@ -195,20 +191,22 @@ class ScenarioSetup(DriveSetup):
 
     @cached_property
     def _task_names(self) -> list[str]:
-        return [title_of(task, self.robot) for task in self.scenario.controller().task]
+        return [title_of(task, self.robot) for task in self.scenario.controller().given.task]
 
     def _with(self, settings: Settings) -> Scenario:
         kind = str(settings.get("resolver.kind", self.scenario.parts.resolver.kind))
         known = RESOLVER_PARTS[kind].model_fields
         chosen: dict[str, object] = {"resolver.kind": kind}
         weights: dict[str, object] = {}
+        if self.scenario.parts.retreat is not None and not settings.get("retreat"):
+            chosen["retreat"] = False  # so that it never gives up
         for key, value in settings.items():
             room, _, rest = key.partition(".")
             if key == "resolver.kind" or (room == "resolver" and rest.partition(".")[0] not in known):
                 continue
             if key.startswith("resolver.weights."):
                 weights[rest.partition(".")[2]] = value
-            elif key != "limits" or value != (self.scenario.parts.limits is not None):
+            elif key != "retreat" and (key != "limits" or value != (self.scenario.parts.limits is not None)):
                 chosen[key] = value
         if weights:
             given = self.scenario.parts.resolver.model_dump().get("weights") or {}
@@ -294,7 +292,7 @@ def targets_of(controller: Controller, q: Array, *, at_robot: bool) -> tuple[Tar
     """A target for each task: at t = 0 and q (n,) its reference's value, or the robot's."""
     here = Configuration(controller.robot, q)
     found = []
-    for task in controller.task:
+    for task in controller.given.task:
         value = evaluate(task.function if at_robot else task.reference, 0.0, here).value
         rows = tuple((row.name, row.unit) for row in task.function.rows(controller.robot))
         shown = task.function.shown()
@@ -313,12 +311,15 @@ def title_of(task: Task, robot: Robot) -> str:
 
 
 def aimed(controller: Controller, targets: tuple[Target, ...]) -> Controller:
-    """A controller whose tasks follow the targets; without retreats, so that it never gives up."""
+    """A controller whose tasks follow the targets."""
     tasks = [
-        Task(task.function, target.signal, task.gain, task.priority, task.speed, task.braking, task.name)
-        for task, target in zip(controller.task, targets, strict=True)
+        Task(
+            *(task.function, target.signal, task.gain, task.priority, task.speed, task.braking, task.name),
+            when=task.when,
+        )
+        for task, target in zip(controller.given.task, targets, strict=True)
     ]
-    return Controller(*controller.given._replace(task=Stack.of(tasks), dt=controller.dt, retreat=None))
+    return controller.with_arguments(task=Stack.of(tasks))
 
 
 def led_by(controller: Controller, task: Task, resolver: Resolver) -> Controller:

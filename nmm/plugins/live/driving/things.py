@@ -84,7 +84,7 @@ class Things:
             limits = copy(limits)
             limits.bounds = tuple(self._moved(bound) for bound in limits.bounds)
         tasks = Stack(tuple(self._moved(task) for task in given.task))
-        return Controller(*given._replace(task=tasks, limits=limits, dt=controller.dt))
+        return controller.with_arguments(task=tasks, limits=limits)
 
     def _moved(self, part: Any) -> Any:
         """A task or a bound whose function sees them."""
