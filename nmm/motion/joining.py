@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -52,6 +53,11 @@ def join(
     seen = SeenPoints(stack, controller.limits, robot)
     happened = [*schedule.events, *(event for part in parts for event in part.events)]
     more = {name: arrays.pop(name) for name in [*arrays] if name in parts[0].more}
+    own: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts])
+        for name in ("u_dot", "believed")
+        if getattr(parts[0], name) is not None
+    }
     joined = replace(
         parts[0],
         **arrays,
@@ -65,7 +71,7 @@ def join(
         path=path,
         desired=desired,
         planned=None,
-        u_dot=None if parts[0].u_dot is None else np.concatenate([part.u_dot for part in parts]),
+        **own,
         target=drawn.mark(path),
         seen=seen.at(t, q),
         cameras=seen.cameras,

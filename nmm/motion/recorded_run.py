@@ -41,10 +41,9 @@ def record_run(
     until: Goal | None = None,
     leg: Leaving | None = None,
     watch: Callable[[Recorder], None] | None = None,
-    recorder: Recorder | None = None,
 ) -> tuple[Recorder, Ended]:
-    """Run over the times (N,) from q; `watch` gets the recorder first, a new one unless given."""
-    recorder = Recorder(controller, times) if recorder is None else recorder
+    """Run over the times (N,) from q; `watch` gets the recorder first."""
+    recorder = Recorder(controller, times)
     recorder.at_middle = plant.integrator.at_middle
     if watch is not None:
         watch(recorder)

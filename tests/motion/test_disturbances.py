@@ -125,3 +125,22 @@ def test_an_arm_that_stands_has_no_odometry() -> None:
     with pytest.raises(nmm.InputError) as found:
         nmm.Disturbances(odometry=True).on(nmm.load("small_arm", platform="fixed"), 0.01)
     assert "odometry" in found.value.where
+
+
+def test_tasks_that_begin_and_end_are_told_by_what_odometry_believes() -> None:
+    robot = nmm.load("unicycle_2r")
+    reach = nmm.Task(nmm.Position("ee", "xy"), [1.4, 0.5], name="reach")
+    inside = nmm.While(nmm.LinearCoordinates("x"), lower=0.1)
+    aim = nmm.Task(nmm.Posture("q1"), [0.5], name="aim", priority=2, when=inside)
+    controller = nmm.SequencedController(robot, [reach, aim], nmm.ProjectedGradient())
+    worn = nmm.Disturbances(slip={"v": 0.8}, odometry=True)
+    run = nmm.simulate(controller, {"q2": 0.5}, 2.0, 0.01, "zoh", disturbances=worn)
+    begins = int(np.searchsorted(run.t, run.events[0].t))
+    assert run.believed.shape == run.q.shape
+    assert run.believed[begins - 1, 0] < 0.1 <= run.believed[begins, 0]
+    assert run.q[begins, 0] < 0.095
+    kept = nmm.rollout(
+        *(controller, {"q2": 0.5}, 2.0, 0.01, "zoh"), disturbances=worn, keep=("q", "believed", "error")
+    )
+    for name in ("q", "believed", "error"):
+        np.testing.assert_array_equal(kept[name][0], run[name])

@@ -223,7 +223,7 @@ class _Runs:
             legs = run_legs(controller, plant, self.times, start, None, self.until)
             recorder = legs[-1].recorder
             outcome, why, *_ = legs[-1].ended
-            why = (*why, *(one for leg in legs for one in leg.recorder.findings if one not in why))
+            why = (*why, *(one for leg in legs for one in leg.recorder.noticed()))
             found = joined_record(controller, schedule, legs)
             waits = schedule.sequence.waiting(schedule.settle()) or not any(legs[-1].active)
             reached = not waits and _at_goal(recorder, self.until)
