@@ -229,8 +229,6 @@ def test_what_is_not_known_at_order_2_is_refused() -> None:
         nmm.Controller(ROBOT, nmm.Task(nmm.Position("ee", "xy"), CIRCLE), nmm.ProjectedGradient(), order=3)
     with refused("collisions"):
         circling(collisions=nmm.Collisions(), dt=0.01)
-    with refused("step"):  # it has no objective to choose α by
-        circling(nmm.ProjectedGradient(step="armijo"), dt=0.01)
     with refused("servo"):
         circling(limits=nmm.Limits(acceleration=1.0), dt=0.01, servo=200.0)
     with refused("method"):
@@ -240,6 +238,30 @@ def test_what_is_not_known_at_order_2_is_refused() -> None:
     first = nmm.Controller(ROBOT, nmm.Task(nmm.Position("ee", "xy"), CIRCLE), nmm.ProjectedGradient())
     with refused("u"):
         first(0.0, Q0, np.zeros(4))
+
+
+def test_armijos_rule_descends_where_a_constant_step_overshoots() -> None:
+    """u is the answer of the sample before: servo = 1 / dt."""
+
+    def left(step: str) -> nmm.Trajectory:
+        resolver = nmm.ProjectedGradient(alpha=400.0, step=step)
+        controller = circling(resolver, target=[2.0, 1.0], servo=50.0, dt=0.02)
+        return nmm.simulate(controller, ROBOT.q({"q1": 1.2, "q2": 0.8}), 2.0, 0.02, "zoh")
+
+    found = left("armijo")
+    assert found["step_size"].min() < 0.5
+    assert found.objective[-1] < 1e-3 * found.objective[0]
+    assert not left("constant").objective[-1] < found.objective[0]
+
+
+def test_a_retreat_accelerates_within_the_limits() -> None:
+    limits = nmm.Limits({"v": 0.5, "omega": 1.0}, acceleration=2.0)
+    backs_off = nmm.Retreat(stalled=0.1, progress=0.5, durations=[0.3])
+    controller = circling(target=[2.0, 1.0], limits=limits, retreat=backs_off, dt=0.01)
+    run = nmm.simulate(controller, Q0, 2.0, 0.01, "zoh")
+    assert controller.solver.retreat_state.count > 1
+    assert np.abs(run["u_dot"]).max() < 2.0 + 1e-9
+    np.testing.assert_allclose(np.diff(run.u, axis=0), 0.01 * run["u_dot"][:-1], atol=1e-12)
 
 
 def test_a_scenario_says_its_order_and_its_folder_keeps_the_accelerations(tmp_path: object) -> None:
