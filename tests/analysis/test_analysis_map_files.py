@@ -18,7 +18,6 @@ from nmm.control.functions.tasks import Heading, Position
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot
-from nmm.views.figures.maps import thinned
 from nmm.views.folders.map import is_map
 
 PLANAR = Position("ee", "xy")
@@ -81,18 +80,6 @@ def test_only_the_worst_postures_of_a_workspace_are_singular(robot_2r: Robot) ->
     assert made.extremes(name)["smallest"][::2] == (best, "")
     assert made.extremes(name, worst=True)["smallest"][::2] == (0.0, "the arm's singular lines")
     assert made.summary()["measures"][name]["worst"]["smallest"]["value"] == 0.0
-
-
-def test_a_line_keeps_the_points_that_its_shape_needs() -> None:
-    straight = np.column_stack([np.linspace(0.0, 3.0, 400), np.linspace(1.0, 2.0, 400)])
-    np.testing.assert_array_equal(thinned(straight, np.full(2, 1e-6)), straight[[0, -1]])
-    angle = np.linspace(0.0, 2.0 * np.pi, 900)
-    circle = np.column_stack([np.cos(angle), np.sin(angle)])
-    kept = thinned(circle, np.full(2, 1e-3))
-    np.testing.assert_array_equal(kept[[0, -1]], circle[[0, -1]])
-    assert 20 < len(kept) < 200
-    # Chords of a circle are nearest to its centre in their middles.
-    assert all(np.hypot(*(0.5 * (a + b))) > 1.0 - 1.001e-3 for a, b in pairwise(kept))
 
 
 def test_a_map_is_written_and_replaced_only_by_another(tmp_path: Path, robot_2r: Robot) -> None:

@@ -1,4 +1,4 @@
-"""What figures are made of: the robot's drawing against closed forms, hulls, thinned curves, looks."""
+"""What figures are made of: the robot's drawing against closed forms, hulls, looks."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from scipy.spatial import ConvexHull
 
 from nmm.base import resolver_style
 from nmm.model.robots.robot import Robot
-from nmm.views.figures import style
 from nmm.views.figures.silhouette import Silhouette, hull
 
 
@@ -52,21 +51,6 @@ def test_hull_is_the_convex_hull(rng: np.random.Generator) -> None:
         assert {tuple(point) for point in found} == {tuple(point) for point in expected}
         following = np.roll(found, -1, axis=0)
         assert np.sum(found[:, 0] * following[:, 1] - found[:, 1] * following[:, 0]) > 0.0
-
-
-def test_thinning_keeps_what_is_seen(rng: np.random.Generator) -> None:
-    t = np.linspace(0.0, 100.0, 1_000_003)
-    y = np.cumsum(rng.normal(size=t.size))
-    y[654_321] = 1e5  # one sample that sticks out
-    x, values = style.thin(t, y)
-    assert len(x) < 1500
-    assert np.all(np.diff(x) > 0.0)
-    assert (x[0], x[-1]) == (t[0], t[-1])
-    assert values.max() == 1e5
-    assert values.min() == y.min()
-    np.testing.assert_array_equal(values, y[np.searchsorted(t, x)])
-    short = np.arange(500.0)
-    assert style.thin(short, short)[0] is short
 
 
 def test_looks_tell_runs_apart() -> None:

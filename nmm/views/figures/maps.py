@@ -33,8 +33,6 @@ LINE = 0.155
 #: Most coordinates that the title names one by one.
 MOST_NAMED = 6
 WORST = "worst posture"
-#: Tolerance for thinning lines, as a share of the map's side: a tenth of a pixel.
-THIN = 1.5e-4
 #: More points than this fill a region and are drawn as small dots, with the map visible between them.
 MANY = 60
 
@@ -248,12 +246,11 @@ def _draw_set(axes: Axes, drawn: Map, those: SingularSet, name: str, color: str)
     width = 1.1 if white else 1.8
     halo = [withStroke(linewidth=width + 1.2, foreground=edge)]
     label = f"{name} singular" + (f": {those.text()}" if those.empty or those.everywhere else "")
-    spans = np.array([float(np.ptp(axis)) for axis in drawn.axes])
     for line in those.lines:
         # Unsnapped: line and halo would go to different pixels.
         axes.plot(
-            *thinned(line, spans * THIN).T, "--" if white else "-", color=color, linewidth=width, label=label,
-            path_effects=halo, clip_on=False, snap=False,
+            *line.T, "--" if white else "-", color=color, linewidth=width, label=label, path_effects=halo,
+            clip_on=False, snap=False,
         )  # fmt: skip
         label = "_"
     if len(those.points):
@@ -266,26 +263,3 @@ def _draw_set(axes: Axes, drawn: Map, those: SingularSet, name: str, color: str)
         )  # fmt: skip
     elif not those.lines:
         axes.plot([], [], " ", label=label)
-
-
-def thinned(line: Array, tolerance: Array) -> Array:
-    """The points of a line (k, 2) that its shape needs within a tolerance (2,) (Douglas and Peucker,
-    1973)."""
-    points = line / tolerance
-    kept = np.zeros(len(line), dtype=bool)
-    kept[[0, -1]] = True
-    pieces = [(0, len(line) - 1)]
-    while pieces:
-        first, last = pieces.pop()
-        if last - first < 2:
-            continue
-        chord, offsets = points[last] - points[first], points[first + 1 : last] - points[first]
-        # To the piece of the straight line: a closed curve's chord is a point.
-        share = np.clip(offsets @ chord / max(float(chord @ chord), 1e-300), 0.0, 1.0)
-        apart = np.linalg.norm(offsets - share[:, np.newaxis] * chord, axis=1)
-        farthest = int(np.argmax(apart))
-        if apart[farthest] > 1.0:
-            middle = first + 1 + farthest
-            kept[middle] = True
-            pieces += [(first, middle), (middle, last)]
-    return np.asarray(line[kept])

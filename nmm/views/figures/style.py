@@ -234,28 +234,12 @@ def groups(kinds: Sequence[str]) -> dict[str, list[int]]:
     return {kind: [i for i, one in enumerate(kinds) if one == kind] for kind in dict.fromkeys(kinds)}
 
 
-def thin(t: Array, y: Array, most: int = 1200) -> tuple[Array, Array]:
-    """Fewer samples with the same picture: the smallest and the largest of each bin, and both ends."""
-    width = -(-2 * len(t) // most)
-    if width <= 2:
-        return t, y
-    bins = len(t) // width
-    parts = np.nan_to_num(y[: bins * width]).reshape(bins, width)
-    first = np.arange(bins) * width
-    picked = [[0, len(t) - 1], first + parts.argmin(axis=1), first + parts.argmax(axis=1)]
-    rest = np.nan_to_num(y[bins * width :])
-    if rest.size:
-        picked.append([bins * width + int(rest.argmin()), bins * width + int(rest.argmax())])
-    kept = np.unique(np.concatenate(picked))
-    return t[kept], y[kept]
-
-
 def curve(
     axes: Axes, t: Array, y: Array, name: str | None, color: str, dashes: str = "-", below: int = 0
 ) -> None:
-    """A curve over time, thinned; wider if others are drawn over it (`below`), to stay visible."""
+    """A curve over time, wider if others are drawn over it (`below`), to stay visible."""
     width = WIDTH + WIDER * below
-    axes.plot(*thin(t, y), dashes, color=color, linewidth=width, label=name, solid_joinstyle="round")
+    axes.plot(t, y, dashes, color=color, linewidth=width, label=name, solid_joinstyle="round")
 
 
 def compared(axes: Axes, worn: Sequence[Look], times: Sequence[Array], values: Sequence[Array]) -> None:
