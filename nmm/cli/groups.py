@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import Field, dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_origin, get_type_hints
@@ -94,22 +94,21 @@ def command(function: Callable[..., int | None]) -> Callable[..., int | None]:
 
     From Python it is called with the options: `redundancy("unicycle_2r", task=["position"])`.
     """
-    groups: dict[str, type] = {}
-    added: dict[str, list[type[OptionGroup]]] = {}
-    parameters: list[inspect.Parameter] = []
     own = _typed(function)
-    taken = {name for name, parameter in own.items() if not _is_group(parameter.annotation)}
-    taken |= {one.name for parameter in own.values() for one in _fields(parameter.annotation)}
-    for name, parameter in own.items():
-        hint = parameter.annotation
-        if (place := _place_of(hint)) is not None:
-            added[name] = place.groups(taken)
-            parameters += [one for group in added[name] for one in _typed(group).values()]
-        elif is_dataclass(hint) and isinstance(hint, type):
-            groups[name] = hint
-            parameters += _typed(hint).values()
-        else:
-            parameters.append(parameter)
+    places = {name: place for name, one in own.items() if (place := _place_of(one.annotation)) is not None}
+    groups: dict[str, Sequence[type[Any]]] = {
+        name: [one.annotation]
+        for name, one in own.items()
+        if isinstance(one.annotation, type) and is_dataclass(one.annotation)
+    }
+    taken = own.keys() - groups.keys() - places.keys()
+    taken |= {field.name for (group,) in groups.values() for field in fields(group)}
+    groups |= {name: place.groups(taken) for name, place in places.items()}
+    parameters = [
+        parameter
+        for name, one in own.items()
+        for parameter in ([one] if name not in groups else _options(groups[name]))
+    ]
     signature = inspect.Signature(
         [
             one.replace(kind=one.POSITIONAL_OR_KEYWORD if one.default is one.empty else one.KEYWORD_ONLY)
@@ -125,13 +124,12 @@ def command(function: Callable[..., int | None]) -> Callable[..., int | None]:
             name: value.default if isinstance(value, ParameterInfo) else value
             for name, value in bound.arguments.items()
         }
-
-        def filled(group: type) -> Any:
-            return group(**{field.name: given.pop(field.name) for field in fields(group)})
-
-        made = {name: filled(group) for name, group in groups.items()}
-        made |= {name: AddedOptions(tuple(map(filled, several))) for name, several in added.items()}
-        return function(**made, **given)
+        for name, several in groups.items():
+            filled = tuple(
+                group(**{field.name: given.pop(field.name) for field in fields(group)}) for group in several
+            )
+            given[name] = AddedOptions(filled) if name in places else filled[0]
+        return function(**given)
 
     del whole.__wrapped__
     whole.__signature__ = signature  # type: ignore[attr-defined]  # what typer reads
@@ -139,17 +137,13 @@ def command(function: Callable[..., int | None]) -> Callable[..., int | None]:
     return whole
 
 
-def _is_group(hint: Any) -> bool:
-    return _place_of(hint) is not None or (is_dataclass(hint) and isinstance(hint, type))
-
-
-def _fields(hint: Any) -> tuple[Field[Any], ...]:
-    return fields(hint) if is_dataclass(hint) and isinstance(hint, type) else ()
-
-
 def _place_of(hint: Any) -> PlaceOfOptions | None:
     note = hint.__metadata__[0] if get_origin(hint) is Annotated else None
     return note if isinstance(note, PlaceOfOptions) else None
+
+
+def _options(groups: Sequence[type]) -> list[inspect.Parameter]:
+    return [one for group in groups for one in _typed(group).values()]
 
 
 def _typed(made: Callable[..., Any]) -> dict[str, inspect.Parameter]:

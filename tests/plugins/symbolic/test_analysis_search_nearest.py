@@ -11,11 +11,10 @@ from numpy import pi
 from numpy.typing import NDArray
 
 from nmm.base.text_format import value_text
-from nmm.cli.subjects import studied
+from nmm.cli.singularities import singularities
 from nmm.control.functions.tasks import CallableFunction, Position
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot
-from nmm.plugins.symbolic.options import search_command, show_nearest, show_search
 from nmm.plugins.symbolic.search.family import values_text
 from nmm.plugins.symbolic.search.many_starts import find_singularities
 from nmm.plugins.symbolic.search.nearest import nearest_singularity
@@ -71,20 +70,20 @@ def test_values_as_people_write_them() -> None:
 
 
 def test_printed(capsys: pytest.CaptureFixture[str]) -> None:
-    subject = studied("unicycle_3r", tasks=["position"], at=["q2=0.3", "q3=0.4"])
-    search_command(subject, 40, nearest=True)
+    singularities(
+        "unicycle_3r", task=["position"], at=["q2=0.3", "q3=0.4"], search=True, starts=40, nearest=True
+    )
     out = capsys.readouterr().out
     assert "q2 = 0 or ±π; q3 = 0 or ±π" in out
-    assert "x, y, theta, q1" in out
+    assert "x, y, theta and q1 free" in out
     assert "loses ee.z" in out
+    assert "dimension 4 of 6" in out
     assert "of 40 starts" in out
     assert "distance 0.5" in out
     assert "-0.3 rad (-17.19°)" in out
     assert "no proof" in out
-    show_nearest(None)
-    assert "no singular configuration found" in capsys.readouterr().out
-    search = find_singularities((load("unicycle_2r"), XY), starts=10)
-    show_search(search)
+    singularities("unicycle_2r", task=["position"], search=True, starts=10, nearest=True)
     out = capsys.readouterr().out
     assert "no singular configuration of J found from 10 starts" in out
+    assert "no singular configuration found near this one" in out
     assert "smallest σ_min" in out
