@@ -3,7 +3,7 @@
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, create_model
+from pydantic import AfterValidator, Field, create_model
 
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError
@@ -16,11 +16,11 @@ from nmm.model.collisions.shapes import Box, Capsule, ConvexMesh, Cylinder, Half
 from nmm.model.robots.loading.packages import package_file
 from nmm.model.robots.robot import Robot
 from nmm.scenario.constructors import FunctionPart, MadePart, keys_of
+from nmm.scenario.files import PACKAGE, FileName
 from nmm.scenario.functions import REFERENCE_PARTS
-from nmm.scenario.keys import OneOf, Part, at
+from nmm.scenario.keys import OneOf, Part, at, each
 from nmm.scenario.numbers import Positive
-from nmm.scenario.robot import PACKAGE, Absolute, FileName, Three
-from nmm.scenario.yaml_text import Place
+from nmm.scenario.robot import Three
 
 
 class ShapePart(Part):
@@ -28,14 +28,9 @@ class ShapePart(Part):
 
     makes: ClassVar[type[Shape]]
 
-    def build(self, absolute: Absolute, place: Place) -> Shape:
-        given = self.explicit(absolute, place)
-        del given["kind"]
+    def build(self) -> Shape:
         with self.own_keys():
-            return self.makes(**given)
-
-    def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
-        return self.model_dump()
+            return self.makes(**self.model_dump(exclude={"kind"}))
 
 
 class MeshPart(ShapePart):
@@ -46,15 +41,12 @@ class MeshPart(ShapePart):
     file: FileName = Field(description="STL, DAE, OBJ or PLY, relative to the scenario")
     scale: Three = Field([1.0, 1.0, 1.0], description="of its axes")
 
-    def build(self, absolute: Absolute, place: Place) -> Shape:
+    def build(self) -> Shape:
         with self.own_keys():
             try:
-                return super().build(absolute, place)
+                return super().build()
             except InputError as error:  # Mesh names the file, not the key
                 raise error.placed(error.where.replace("mesh", "file", 1)) from None
-
-    def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
-        return {**self.model_dump(), "file": str(absolute(self.file, (*place, "file")))}
 
 
 def _shape(kind: str, makes: type[Shape], about: str, **keys: Any) -> type[ShapePart]:
@@ -137,9 +129,9 @@ class ObstaclePart(Part):
         "circle, polynomial, spline)",
     )
 
-    def build(self, robot: Robot, absolute: Absolute, place: Place) -> Obstacle:
+    def build(self, robot: Robot) -> Obstacle:
         with at("shape"):
-            shape = self.shape.build(absolute, (*place, "shape"))
+            shape = self.shape.build()
         turned = rotation_vector(rpy=self.rpy)
         if self.motion is None:
             xyz = [0.0, 0.0, 0.0] if self.xyz is None else self.xyz
@@ -150,12 +142,13 @@ class ObstaclePart(Part):
             along = Along(self.motion.build(robot), robot, turned)
         return Obstacle(shape, motion=along, name=self.name, velocity=along.velocity)
 
-    def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
-        return {**self.model_dump(), "shape": self.shape.explicit(absolute, (*place, "shape"))}
+
+def _whole_file(value: bool | str | None) -> bool | str | None:
+    return str(package_file(value)) if isinstance(value, str) and value.startswith(PACKAGE) else value
 
 
 _SRDF = (
-    bool | FileName | None,
+    Annotated[bool | FileName | None, AfterValidator(_whole_file)],
     "MoveIt's file of disabled pairs, relative to the scenario, or package://PACKAGE/PATH; true for the "
     "robot's own",
 )
@@ -168,36 +161,16 @@ class CollisionsPart(
     """Distances that are never less than a number; `collisions: true` is this with its defaults."""
 
     makes = Collisions
-    beside = ("obstacles", "ignore", "srdf")
+    beside = ("obstacles", "ignore")
 
     obstacles: list[ObstaclePart] = Field(default_factory=list, description="shapes to avoid")
 
-    def build_obstacles(self, robot: Robot, absolute: Absolute, place: Place) -> list[Obstacle]:
-        obstacles = []
-        for i, part in enumerate(self.obstacles):
-            with at("obstacles", i):
-                obstacles.append(part.build(robot, absolute, (*place, "obstacles", i)))
-        return obstacles
+    def build_obstacles(self, robot: Robot) -> list[Obstacle]:
+        return each(self.obstacles, lambda part: part.build(robot), "obstacles")
 
-    def build(self, robot: Robot, absolute: Absolute, place: Place) -> Collisions:
-        with at("srdf"):
-            srdf = self._srdf(absolute, place)
-        obstacles = self.build_obstacles(robot, absolute, place)
+    def build(self, robot: Robot) -> Collisions:
         ignore = [(first, second) for first, second in self.ignore]
-        collisions: Collisions = self.made_with(obstacles=obstacles, srdf=srdf, ignore=ignore)
+        collisions: Collisions = self.made_with(obstacles=self.build_obstacles(robot), ignore=ignore)
         with self.own_keys():
             collisions.on(robot)
         return collisions
-
-    def _srdf(self, absolute: Absolute, place: Place) -> str | bool | None:
-        if not isinstance(self.srdf, str):
-            return self.srdf
-        if self.srdf.startswith(PACKAGE):
-            return str(package_file(self.srdf))
-        return str(absolute(self.srdf, (*place, "srdf")))
-
-    def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
-        obstacles = [
-            part.explicit(absolute, (*place, "obstacles", i)) for i, part in enumerate(self.obstacles)
-        ]
-        return {**self.model_dump(), "obstacles": obstacles, "srdf": self._srdf(absolute, place)}

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, WrapValidator, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, WrapValidator, model_validator
 
 from nmm.base.errors import InputError, expect_known
-from nmm.base.files import named_folder
+from nmm.scenario.files import FileName, NamedFolder, file_or_package, readable
 from nmm.scenario.keys import KeyedError, Part, at
 from nmm.scenario.numbers import Number, number, numbers, numbers_by_name
 from nmm.scenario.yaml_text import Place
@@ -19,11 +19,6 @@ from nmm.scenario.yaml_text import Place
 if TYPE_CHECKING:
     from nmm.model.platforms import Platform
     from nmm.model.robots.robot import Robot
-
-#: The absolute path of a file that is named at a place of the scenario.
-Absolute = Callable[[str, Place], Path]
-
-PACKAGE = "package://"
 
 
 def _argument(value: object) -> str:
@@ -42,10 +37,8 @@ def _wheels(value: object) -> object:
     raise InputError(expected="a list of joints, or a radius for each", got=value)
 
 
-def _file_name(value: object) -> object:
-    if isinstance(value, str) and (not value.strip() or "\0" in value):
-        raise InputError(expected="a name or a path", got=value)
-    return value
+def _source(text: str) -> str:
+    return text if not Path(text).suffix and len(Path(text).parts) == 1 else file_or_package(text)
 
 
 def _point(value: object, sizes: tuple[int, ...], expected: str) -> object:
@@ -83,14 +76,13 @@ def _plain(value: object) -> Any:
         return value
 
 
-FileName = Annotated[str, BeforeValidator(_file_name)]
 Three = Annotated[list[float], BeforeValidator(lambda value: _point(value, (3,), "3 numbers"))]
 
 
 class RobotPart(Part):
     """Which robot. A bare name or path in its place is its source."""
 
-    source: FileName = Field(
+    source: Annotated[str, AfterValidator(_source), BeforeValidator(readable)] = Field(
         description="a bundled name (see `nmm robots`), a .urdf, .xacro or .xml file, relative to the "
         "scenario, or package://PACKAGE/PATH"
     )
@@ -102,7 +94,7 @@ class RobotPart(Part):
         description="a kind (car), measured in the file, or {kind: car, wheelbase: 0.5}; by default "
         "what the file declares, else what its wheels allow",
     )
-    package_dirs: list[FileName] = Field(
+    package_dirs: list[NamedFolder] = Field(
         default_factory=list,
         description="folders of package:// names, or NAME=FOLDER of one package, relative to the scenario",
     )
@@ -137,28 +129,14 @@ class RobotPart(Part):
         "error", description="error, or skip to leave out shapes whose mesh is not there"
     )
 
-    def build(self, absolute: Absolute, place: Place) -> Robot:
+    def build(self) -> Robot:
         from nmm.model.robots.loading import load
 
-        data = self.explicit(absolute, place) | {"platform": _platform(self.platform)}
+        data = self.model_dump() | {"platform": _platform(self.platform)}
         return load(data.pop("source"), **data)
 
-    def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
-        def whole(file: str, key: str) -> str:
-            return file if file.startswith(PACKAGE) else str(absolute(file, (*place, key)))
-
-        def package_folder(given: str) -> str:
-            name, folder = named_folder(given)
-            path = absolute(folder, (*place, "package_dirs"))
-            return f"{name}={path}" if name else str(path)
-
-        is_name = not Path(self.source).suffix and len(Path(self.source).parts) == 1
-        return {
-            **self.model_dump(),
-            "source": self.source if is_name else whole(self.source, "source"),
-            "package_dirs": [package_folder(folder) for folder in self.package_dirs],
-            "srdf": None if self.srdf is None else whole(self.srdf, "srdf"),
-        }
+    def explicit(self) -> dict[str, Any]:
+        return self.model_dump()
 
 
 def _named(value: object) -> object:
@@ -182,16 +160,13 @@ class ArmPart(Part):
         description="put before the arm's names; by default none, or the arm's name where they clash",
     )
 
-    def mount_on(self, platform: Robot, absolute: Absolute, place: Place) -> Robot:
+    def mount_on(self, platform: Robot) -> Robot:
         from nmm.model.robots.loading import mount
 
         with at("arm"):
-            arm = self.arm.build(absolute, (*place, "arm"))
+            arm = self.arm.build()
         with self.own_keys():
             return mount(platform, arm, at=self.at, placement=(self.xyz, self.rpy), prefix=self.prefix)
-
-    def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
-        return {**self.model_dump(), "arm": self.arm.explicit(absolute, (*place, "arm"))}
 
 
 class MountedPart(Part):
@@ -222,19 +197,21 @@ class MountedPart(Part):
                 raise KeyedError(("arms",), expected="at least 1")
         return data
 
-    def build(self, absolute: Absolute, place: Place) -> Robot:
+    def build(self) -> Robot:
         for name in self.limits.keys() & self.platform.limits.keys():
             raise KeyedError(("limits", name), expected=f"once, it is in platform.limits.{name} too")
         with at("platform"):
-            robot = self._limited().build(absolute, (*place, "platform"))
+            robot = self._limited().build()
         for below, arm in self._mounted():
             with at(*below):
-                robot = arm.mount_on(robot, absolute, (*place, *below))
+                robot = arm.mount_on(robot)
         return robot
 
-    def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
-        platform = {"platform": self._limited().explicit(absolute, (*place, "platform"))}
-        arms = [arm.explicit(absolute, (*place, *below)) for below, arm in self._mounted()]
+    def explicit(self) -> dict[str, Any]:
+        platform, arms = (
+            {"platform": self._limited().model_dump()},
+            [arm.model_dump() for _, arm in self._mounted()],
+        )
         return {**platform, "arms": arms} if self.arm is None else platform | arms[0]
 
     def _limited(self) -> RobotPart:

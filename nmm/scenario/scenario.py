@@ -60,13 +60,15 @@ class Scenario:
         self.path = Path(document.name)
         own_name = re.sub(r"[^\w.-]", "_", self.path.name.split(".", 1)[0]) or "scenario"
         data = {"name": own_name, **document.data}
+        from nmm.scenario.files import with_files
         from nmm.scenario.schema import schema
 
         with self._located():
             try:
-                self.parts = schema(data).model_validate(data, context=NamedReferences(data))
+                parts = schema(data).model_validate(data, context=NamedReferences(data))
             except ValidationError as error:
                 raise first_error(error, data) from None
+        self.parts = with_files(parts, document.absolute)
         #: What is worth a warning of what was set, a sentence each.
         self.warnings = tuple(document.parted())
         self.name = self.parts.name
@@ -120,7 +122,7 @@ class Scenario:
         derived = Scenario(_with_settings(self.document, settings))
         derived._own = self._own
         of_robot = any(key.split(".", 1)[0] == "robot" for key in settings)
-        if not of_robot or derived._explicit_robot() == self._explicit_robot():
+        if not of_robot or derived.parts.robot == self.parts.robot:
             derived._robot = self._robot
         return derived
 
@@ -148,7 +150,7 @@ class Scenario:
         """The robot, loaded once."""
         if self._robot is None:
             with self._located(), at("robot"):
-                self._robot = self.parts.robot.build(self.document.absolute, ("robot",))
+                self._robot = self.parts.robot.build()
         return self._robot
 
     def controller(self, progress: Progress | None = None) -> Controller:
@@ -169,14 +171,14 @@ class Scenario:
         if part is None:
             return ()
         with self._located(), at("collisions"):
-            return tuple(part.build_obstacles(robot, self.absolute, ("collisions",)))
+            return tuple(part.build_obstacles(robot))
 
     def surroundings(self, robot: Robot) -> Surroundings:
         """What is drawn beside a robot in it; `ScenarioError` for a frame or a mesh that is not there."""
         if self.parts.scene is None:
             return Surroundings()
         with self._located(), at("scene"):
-            return self.parts.scene.build(robot, self.absolute, ("scene",))
+            return self.parts.scene.build(robot)
 
     def plan(self, progress: Progress | None = None) -> Plan:
         """The planned motion from its start, by the key `plan` or its defaults: see `nmm.plan`.
@@ -251,16 +253,7 @@ class Scenario:
 
         Written to a YAML file, it gives the same run to the last bit.
         """
-        data = self.parts.explicit()
-        data["robot"] = self._explicit_robot()
-        if self.parts.collisions is not None:
-            data["collisions"] = self.parts.collisions.explicit(self.absolute, ("collisions",))
-        if self.parts.scene is not None:
-            data["scene"] = self.parts.scene.explicit(self.absolute, ("scene",))
-        return data
-
-    def _explicit_robot(self) -> dict[str, Any]:
-        return self.parts.robot.explicit(self.document.absolute, ("robot",))
+        return self.parts.explicit()
 
     @contextmanager
     def _located(self) -> Iterator[None]:

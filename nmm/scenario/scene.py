@@ -14,8 +14,7 @@ from nmm.model.robots.surroundings import Body, Carried, Surroundings
 from nmm.scenario.collisions import SHAPE_PARTS, ShapePart
 from nmm.scenario.keys import OneOf, Part, at
 from nmm.scenario.numbers import Number, Positive, numbers
-from nmm.scenario.robot import Absolute, Three
-from nmm.scenario.yaml_text import Place
+from nmm.scenario.robot import Three
 
 SIDES = ("iso", "top", "front", "wall")
 
@@ -41,15 +40,12 @@ class DrawnPart(Part):
     xyz: Three = Field([0.0, 0.0, 0.0], description="its origin, m")
     rpy: Three = Field([0.0, 0.0, 0.0], description="roll, pitch, yaw about fixed axes, rad")
 
-    def drawn(self, absolute: Absolute, place: Place) -> tuple[str, Any, Array]:
+    def drawn(self) -> tuple[str, Any, Array]:
         """Its name, its shape, Coal's, and where that is, (4, 4) m."""
         with at("shape"):
-            shape = self.shape.build(absolute, (*place, "shape"))
+            shape = self.shape.build()
         there = Obstacle(shape, [*self.xyz, *rotation_vector(rpy=self.rpy)], name=self.name)
         return there.name, shape.geometry(), there.placement(0.0)
-
-    def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
-        return {**self.model_dump(), "shape": self.shape.explicit(absolute, (*place, "shape"))}
 
 
 class CarriedPart(DrawnPart):
@@ -79,24 +75,17 @@ class ScenePart(Part):
         None, description="the time that the page shows first, s"
     )
 
-    def build(self, robot: Robot, absolute: Absolute, place: Place) -> Surroundings:
+    def build(self, robot: Robot) -> Surroundings:
         carried, scenery = [], []
         for i, load in enumerate(self.carried):
             with at("carried", i):
                 with at("frame"):
                     robot.frame_id(load.frame)
-                name, geometry, there = load.drawn(absolute, (*place, "carried", i))
+                name, geometry, there = load.drawn()
                 carried.append(Carried(name, geometry, load.frame, there, load.mass or 0.0))
         for i, thing in enumerate(self.scenery):
             with at("scenery", i):
-                name, geometry, there = thing.drawn(absolute, (*place, "scenery", i))
+                name, geometry, there = thing.drawn()
                 scenery.append(Body(name, geometry, there[np.newaxis]))
         camera = self.camera if isinstance(self.camera, str) else tuple(self.camera)
         return Surroundings(tuple(carried), tuple(scenery), camera, self.opens)
-
-    def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
-        listed = {
-            key: [part.explicit(absolute, (*place, key, i)) for i, part in enumerate(getattr(self, key))]
-            for key in ("carried", "scenery")
-        }
-        return {**self.model_dump(), **listed}

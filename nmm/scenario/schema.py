@@ -22,13 +22,14 @@ from nmm.model.robots.robot import Robot
 from nmm.model.robots.semantics import POSTURE
 from nmm.scenario.collisions import CollisionsPart
 from nmm.scenario.disturbances import DisturbancesPart
+from nmm.scenario.files import Absolute
 from nmm.scenario.functions import REFERENCE_PARTS
 from nmm.scenario.keys import KeyedError, Part, at
 from nmm.scenario.limits import GoalPart, LimitsPart, RetreatPart, SteeringPart, part_or_none
 from nmm.scenario.numbers import Nested, Positive, integer, numbers, numbers_by_name
 from nmm.scenario.objectives import ObjectiveList, QuadraticPart, build_objective
 from nmm.scenario.resolvers import AnyResolver, WithAddedTask
-from nmm.scenario.robot import Absolute, RobotChoice
+from nmm.scenario.robot import RobotChoice
 from nmm.scenario.scene import ScenePart
 from nmm.scenario.sections import Making, Motion, Section, about, section_class, section_names
 from nmm.scenario.tasks import TASK_PARTS, TaskList, TaskPart, build_tasks, listed
@@ -152,11 +153,9 @@ class ScenarioPart(Part):
         with about(key):
             return section.motion(making)
 
-    def build_collisions(self, robot: Robot, absolute: Absolute) -> Collisions | None:
+    def build_collisions(self, robot: Robot) -> Collisions | None:
         with at("collisions"):
-            return (
-                None if self.collisions is None else self.collisions.build(robot, absolute, ("collisions",))
-            )
+            return None if self.collisions is None else self.collisions.build(robot)
 
     def build(
         self,
@@ -189,7 +188,7 @@ class ScenarioPart(Part):
                 raise InputError(expected=expected, got=first)
         with at("limits"):
             limits = None if self.limits is None else self.limits.build(robot)
-        collisions = self.build_collisions(robot, absolute)
+        collisions = self.build_collisions(robot)
         with at("objective"):
             objective = build_objective(self.objective, robot, collisions)
         with at("retreat"):
@@ -197,7 +196,7 @@ class ScenarioPart(Part):
             retreat = None if self.retreat is None else self.retreat.build(robot, goal)
         with at("scene"):
             if self.scene is not None:
-                self.scene.build(robot, absolute, ("scene",))
+                self.scene.build(robot)
         with at("disturbances"):
             if self.disturbances is not None:
                 self.disturbances.build(robot, self.dt)
@@ -258,6 +257,7 @@ class ScenarioPart(Part):
     def explicit(self) -> dict[str, Any]:
         """Every key as plain data, with what the library chooses where the file leaves it open."""
         data = self.model_dump()
+        data["robot"] = self.robot.explicit()
         data["resolver"] = self.resolver.explicit()
         if isinstance(self.resolver, WithAddedTask):
             added = self._added_task(self.resolver)

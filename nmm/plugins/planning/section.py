@@ -137,7 +137,7 @@ class PlanSection(Section):
                 if len(tasks) > 1 or any(task.when for task in tasks):
                     raise InputError(expected="one task, as its target is the plan's goal; or plan.to")
                 goal = tasks[0]
-        collisions = parts.build_collisions(robot, making.absolute)
+        collisions = parts.build_collisions(robot)
         with at("plan"), at("objective"):
             objective = build_objective(self.objective, robot, collisions)
         limits = None if parts.limits is None else parts.limits.build(robot)

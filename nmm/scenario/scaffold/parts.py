@@ -13,8 +13,9 @@ from nmm.base.errors import InputError, RobotError, expect
 from nmm.base.files import named_folder
 from nmm.model.robots.loading.provenance import PLATFORM_SOURCES, provenance_of
 from nmm.model.robots.robot import Robot
+from nmm.scenario.files import PACKAGE, with_files
 from nmm.scenario.keys import first_error
-from nmm.scenario.robot import PACKAGE, MountedPart, RobotPart
+from nmm.scenario.robot import MountedPart, RobotPart
 from nmm.scenario.yaml_text import dotted
 
 #: The base of an arm that comes without one: two driven wheels, with v and omega for inputs.
@@ -119,7 +120,7 @@ def _built(data: Mapping[str, Any], folder: Path) -> Robot:
     except ValidationError as error:
         wrong = first_error(error, data)
         raise wrong.at(dotted(wrong.place), InputError) from None
-    return part.build(lambda file, _: folder / file, ())
+    return with_files(part, lambda file, _: folder / file).build()
 
 
 def _origin(robot: Robot) -> str:
