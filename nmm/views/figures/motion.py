@@ -127,10 +127,14 @@ class Scene(Viewed):
         if width not in self._labels:
             drawn = np.vstack(self._drawn(view))
             drawn = drawn[np.isfinite(drawn).all(axis=1)]
-            extent = float(np.ptp(drawn[:, 0]))
+            low, high = drawn.min(axis=0), drawn.max(axis=0)
+            extent = float(high[0] - low[0])
             # The farther out they stand, the smaller is all else drawn, and the larger are they beside it.
             scale = 1.1 * extent / width
-            subjects, ground = self._shown(view, scale)
+            mains = [hull(view.of(pose.main)) for pose in self.poses]
+            solid = [hull(view.of(one.points)) for one in self.outlines if one.times]
+            subjects = [Subject(*one) for one in zip(self._times(), [*mains, *solid], strict=True)]
+            ground = Ground(lambda axes: self._draw_scene(axes, view), low, high, scale)
             for _ in range(4):
                 scale = 1.1 * extent / width
                 found = places(subjects, ground, scale)
@@ -141,25 +145,24 @@ class Scene(Viewed):
             self._labels[width] = found
         return self._labels[width]
 
-    def _shown(self, view: View, scale: float) -> tuple[list[Subject], Ground]:
-        """What times belong to, and all that is drawn, at about so many m for each inch."""
-        robots = [edge for pose in self.poses for edges in pose.outlines(view) for edge in edges]
-        links = [view.of(ends) for pose in self.poses for ends in pose.links]
-        solid = [hull(view.of(outline.points)) for outline in self.outlines]
-        paths = [view.of(line) for line in (*self.lines.values(), *self.seen.lines)]
-        mains = [hull(view.of(pose.main)) for pose in self.poses]
-        texts = [_seconds(float(t)) for t in self.times]
-        texts += [_span(*outline.times) if outline.times else "" for outline in self.outlines]
-        named = zip(texts, [*mains, *solid], strict=True)
-        subjects = [Subject(text, edge) for text, edge in named if text]
-        ends, targets = view.of(self.lines["path"][[0, -1]]), self.trajectory.marks
-        targets = view.of(np.vstack([targets, self.seen.marks]))
-        marks = [*_around(ends, _END, scale), *_around(targets, style.TARGET, scale)]
-        return subjects, Ground([*paths, *links, *marks], [*robots, *solid], scale)
+    def _times(self) -> list[str]:
+        """Those of the robots, then those of obstacles that move."""
+        of_obstacles = (_span(*outline.times) for outline in self.outlines if outline.times is not None)
+        return [*map(_seconds, self.times.tolist()), *of_obstacles]
 
     def draw(self, axes: Axes, view: View) -> None:
-        trajectory = self.trajectory
         self.dress(axes, view)
+        self._draw_scene(axes, view)
+        width, _ = style.inches(axes)
+        for k, (place, text) in enumerate(zip(self.times_at(view, width), self._times(), strict=False)):
+            color = style.GREY if k < len(self.times) else OBSTACLE_TEXT
+            x, y = place.middle.tolist()
+            axes.text(x, y, text, color=color, fontsize=SIZE, ha="center", va="center", zorder=7)
+            if place.foot is not None:
+                axes.plot(*np.array([place.foot, place.end]).T, color=color, linewidth=0.5, zorder=6.5)
+
+    def _draw_scene(self, axes: Axes, view: View) -> None:
+        """All but the times, in axes that have their limits."""
         for k, (pose, strength) in enumerate(zip(self.poses, _strengths(len(self.poses)), strict=True)):
             # From the side the robots of a round path stand behind each other: every second one is enough.
             if view == ABOVE or len(self.poses) <= 6 or (len(self.poses) - 1 - k) % 2 == 0:
@@ -174,7 +177,6 @@ class Scene(Viewed):
             )  # fmt: skip
             named.add(outline.name)
         self.seen.draw(axes, view.of)
-        self._draw_times(axes, view)
         if "desired" in self.lines:
             axes.plot(
                 *view.of(self.lines["desired"]).T, "--", color=resolver_style.BLACK, linewidth=1.1,
@@ -188,7 +190,7 @@ class Scene(Viewed):
         path = view.of(self.lines["path"])
         axes.plot(*path.T, color=_PATH_COLOR, linewidth=1.5, label=self._path_name, zorder=5.1)
         style.mark_ends(axes, path, _END)
-        style.mark_targets(axes, view.of(trajectory.marks))
+        style.mark_targets(axes, view.of(self.trajectory.marks))
 
     def _fineness(self, axes: Axes) -> float:
         """How much thinner than usual lines are, so that arms and outlines of small robots stay apart."""
@@ -196,17 +198,6 @@ class Scene(Viewed):
         length = float(np.linalg.norm(np.ptp(self.poses[0].main[:, :2], axis=0)))
         points = 72.0 * length * style.inches(axes)[0] / (right - left)
         return float(np.clip(points / _LARGE, _FINEST, 1.0))
-
-    def _draw_times(self, axes: Axes, view: View) -> None:
-        width, _ = style.inches(axes)
-        of_obstacles = [_span(*outline.times) for outline in self.outlines if outline.times is not None]
-        texts = [*map(_seconds, self.times.tolist()), *of_obstacles]
-        for k, (place, text) in enumerate(zip(self.times_at(view, width), texts, strict=False)):
-            color = style.GREY if k < len(self.times) else OBSTACLE_TEXT
-            x, y = place.middle.tolist()
-            axes.text(x, y, text, color=color, fontsize=SIZE, ha="center", va="center", zorder=7)
-            if place.foot is not None:
-                axes.plot(*np.array([place.foot, place.end]).T, color=color, linewidth=0.5, zorder=6.5)
 
 
 def outlines(trajectory: Trajectory, times: Array) -> list[Outline]:
@@ -248,13 +239,6 @@ def with_the_nearest(trajectory: Trajectory, times: Array) -> Array:
     inner = times[1:-1]
     inner[int(np.argmin(np.abs(inner - nearest)))] = nearest
     return np.sort(times)
-
-
-def _around(points: Array, size: float, scale: float) -> list[Array]:
-    """The edges of marks of that size, pt, at points (k, 2) of a drawing of `scale` m for each inch."""
-    angles = np.linspace(0.0, 2.0 * np.pi, 13)
-    circle = np.column_stack([np.cos(angles), np.sin(angles)]) * 0.5 * size / 72.0 * scale
-    return [point + circle for point in points]
 
 
 def _seconds(t: float) -> str:

@@ -71,7 +71,8 @@ def ticks(axes: Axes, size: float = SMALL) -> None:
 
 def inches(axes: Axes) -> tuple[float, float]:
     room = axes.get_window_extent()
-    return float(room.width) / DPI, float(room.height) / DPI
+    dpi = axes.figure.dpi
+    return float(room.width) / dpi, float(room.height) / dpi
 
 
 def column(

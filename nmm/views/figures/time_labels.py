@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import heapq
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from nmm.base.arrays import Array, Flags
 from nmm.views.figures import style
@@ -14,8 +14,8 @@ from nmm.views.figures import style
 #: Size of the text, pt, and what a character and a line take at most, in.
 SIZE = style.SMALL - 1.0
 _CHARACTER, _LINE = 0.66 * SIZE / 72.0, 0.95 * SIZE / 72.0
-#: Room around a text, which holds half of a joint's mark or of the widest line that is drawn, in.
-_PAD = 0.05
+#: Room around a text, in.
+_PAD = 0.03
 #: A text that is farther from its subject than this has a line that leads there, in.
 _FAR = 0.16
 #: Where another subject is as near but for so much, a text stands rather so much farther from its own, in.
@@ -75,23 +75,15 @@ def places(subjects: Sequence[Subject], ground: Ground, scale: float) -> list[Pl
         candidates, outwards = candidates[free], np.tile(outwards, len(gaps))[free]
         apart, feet = _apart(candidates, half, edges[number])
         others = np.vstack([np.zeros((0, 2)), *edges[:number], *edges[number + 1 :]])
-        clear, unclear = apart - 0.02 * outwards * scale, apart + (_UNCLEAR - 0.02 * outwards) * scale
-        # The cheapest first; whether another subject is nearer, which costs more, is asked of those reached.
-        queue = [(cost, k, False) for k, cost in enumerate(clear.tolist())]
-        heapq.heapify(queue)
+        unclear = _apart(candidates, half, others)[0] < apart + _AS_NEAR * scale
         place = None
-        while queue:
-            _, k, is_unclear = heapq.heappop(queue)
-            if not is_unclear and _nearest(candidates[k], half, others) < apart[k] + _AS_NEAR * scale:
-                heapq.heappush(queue, (float(unclear[k]), k, True))
-                continue
-            foot = feet[k]
-            if apart[k] <= _FAR * scale and not is_unclear:
+        for k in np.argsort(apart + (_UNCLEAR * unclear - 0.02 * outwards) * scale, kind="stable"):
+            if apart[k] <= _FAR * scale and not unclear[k]:
                 place = Place(candidates[k], half, None)
                 break
-            lead = _sampled([np.array([foot, candidates[k]])], cell)
+            lead = _sampled([np.array([feet[k], candidates[k]])], cell)
             if _clear(lead, np.full(2, pad), found, leads).all():
-                place = Place(candidates[k], half, foot)
+                place = Place(candidates[k], half, feet[k])
                 leads = np.vstack([leads, lead])
                 break
         if place is None:  # no place within reach is free: far above everything there is one
@@ -105,32 +97,20 @@ def places(subjects: Sequence[Subject], ground: Ground, scale: float) -> list[Pl
 
 def _sampled(lines: Sequence[Array], spacing: float) -> Array:
     """Points along polylines (k, 2), no farther apart than `spacing`, (P, 2)."""
-    starts = np.vstack([line[: max(1, len(line) - 1)] for line in lines])
-    ends = np.vstack([line[1:] if len(line) > 1 else line for line in lines])
-    known = np.isfinite(starts).all(axis=1) & np.isfinite(ends).all(axis=1)
-    starts, ends = starts[known], ends[known]
-    counts = 1 + (np.linalg.norm(ends - starts, axis=1) // spacing).astype(int)
-    first = np.repeat(np.cumsum(counts) - counts, counts)
-    shares = (np.arange(counts.sum()) - first) / np.repeat(counts, counts)
-    points = np.repeat(starts, counts, axis=0) + shares[:, None] * np.repeat(ends - starts, counts, axis=0)
-    return np.vstack([points, ends])
+    points = [np.zeros((0, 2))]
+    for line in lines:
+        way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+        along = np.linspace(0.0, way[-1], 2 + int(way[-1] // spacing))
+        points.append(np.column_stack([np.interp(along, way, axis) for axis in line.T]))
+    return np.vstack(points)
 
 
 def _apart(middles: Array, half: Array, points: Array) -> tuple[Array, Array]:
-    """How far boxes around `middles` (P, 2) are from the nearest of points, (P,) m, and that, (P, 2)."""
-    away = _distances(middles[:, None], half, points)
-    nearest = np.argmin(away, axis=1)
-    return away[np.arange(len(away)), nearest], points[nearest]
-
-
-def _nearest(middle: Array, half: Array, points: Array) -> float:
-    """How far a box is from the nearest of points, m; inf from none."""
-    return float(_distances(middle, half, points).min(initial=np.inf))
-
-
-def _distances(middles: Array, half: Array, points: Array) -> Array:
-    away: Array = np.hypot(*np.moveaxis(np.maximum(np.abs(middles - points) - half, 0.0), -1, 0))
-    return away
+    """How far boxes around `middles` (P, 2) are from the nearest of points, (P,) m, and that, (P, 2); inf
+    from none."""
+    points = np.vstack([points, np.full((1, 2), np.inf)])
+    away = np.hypot(*np.moveaxis(np.maximum(np.abs(middles[:, None] - points) - half, 0.0), -1, 0))
+    return away.min(axis=1), points[away.argmin(axis=1)]
 
 
 def _clear(middles: Array, half: Array, texts: Sequence[Place], leads: Array) -> Flags:
@@ -143,42 +123,31 @@ def _clear(middles: Array, half: Array, texts: Sequence[Place], leads: Array) ->
 
 
 class Ground:
-    """The occupied cells, of side `cell`, m, of a grid from low to high (2,), m, around lines (k, 2) and
-    convex, counter-clockwise outlines (k, 2), m; `scale` is about the m per inch."""
+    """The occupied cells, of side `cell`, m, of a grid around a drawing from low to high (2,), m: the pixels
+    of a picture of it, at `scale` m per inch, that are not white."""
 
-    def __init__(self, lines: Sequence[Array], shapes: Sequence[Array], scale: float) -> None:
-        self.cell = 0.25 * _LINE * scale
-        edges = [np.vstack([shape, shape[:1]]) for shape in shapes]
-        marked = _sampled([*lines, *edges], self.cell)
-        room = 1.5 * _FARTHEST * scale
-        self.low, self.high = marked.min(axis=0) - room, marked.max(axis=0) + room
-        self._taken = np.zeros(np.ceil((self.high - self.low) / self.cell).astype(int) + 2, dtype=np.int32)
-        index = ((marked - self.low) // self.cell).astype(int)
-        self._taken[index[:, 0], index[:, 1]] = 1
-        for shape in shapes:
-            self._fill(shape)
-        self._sums = np.zeros(np.add(self._taken.shape, 1), dtype=np.int32)
-        self._sums[1:, 1:] = self._taken.cumsum(axis=0).cumsum(axis=1)
-
-    def _fill(self, outline: Array) -> None:
-        if len(outline) < 3:
-            return
-        first = ((outline.min(axis=0) - self.low) // self.cell).astype(int)
-        last = ((outline.max(axis=0) - self.low) // self.cell).astype(int) + 1
-        x, y = (self.low[k] + (np.arange(first[k], last[k]) + 0.5) * self.cell for k in range(2))
-        (dx, dy), (a, b) = (np.roll(outline, -1, axis=0) - outline).T, outline.T
-        # To the left of every edge: dx (y - b) - dy (x - a) >= 0.
-        left = (dx * y[:, None] - dx * b)[None] - (dy * x[:, None] - dy * a)[:, None]
-        self._taken[first[0] : last[0], first[1] : last[1]] |= (left >= 0.0).all(axis=2)
+    def __init__(self, draw: Callable[[Axes], None], low: Array, high: Array, scale: float) -> None:
+        inches = 0.25 * _LINE
+        self.cell, room = inches * scale, 1.5 * _FARTHEST * scale
+        self.low, self.high = low - room, high + room
+        made = style.figure(*((self.high - self.low) / scale))
+        made.set_dpi(1.0 / inches)
+        axes = made.add_axes((0.0, 0.0, 1.0, 1.0))
+        axes.set_axis_off()
+        axes.set(xlim=(self.low[0], self.high[0]), ylim=(self.low[1], self.high[1]))
+        draw(axes)
+        made.canvas.draw()
+        pixels = np.asarray(made.canvas.buffer_rgba())  # type: ignore[attr-defined]  # of Agg
+        taken = (pixels[::-1, :, :3] < 250).any(axis=2).T
+        self._sums = np.pad(taken.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
 
     def free(self, middles: Array, half: Array) -> Flags:
         """Which of the boxes around `middles` (P, 2) are empty, (P,)."""
-        last = np.array(self._taken.shape)
+        last = np.array(self._sums.shape) - 1
         a = (((middles - half - self.low) // self.cell).astype(int)).clip(0, last)
         b = (((middles + half - self.low) // self.cell).astype(int) + 1).clip(0, last)
+        sums = self._sums
         held = (
-            self._sums[b[:, 0], b[:, 1]] - self._sums[a[:, 0], b[:, 1]]
-            - self._sums[b[:, 0], a[:, 1]] + self._sums[a[:, 0], a[:, 1]]
-        )  # fmt: skip
-        empty: Flags = held == 0
-        return empty
+            sums[b[:, 0], b[:, 1]] - sums[a[:, 0], b[:, 1]] - sums[b[:, 0], a[:, 1]] + sums[a[:, 0], a[:, 1]]
+        )
+        return np.asarray(held == 0)
