@@ -36,11 +36,12 @@ def test_wheels_are_drawn_on_their_axle(robot_2r: Robot) -> None:
     assert all(points[:, 2].min() >= -1e-12 for points in pose.wheels)
 
 
-def test_platform_without_shapes_has_a_neutral_outline(robot_2r: Robot) -> None:
+def test_platform_without_shapes_is_a_plate(robot_2r: Robot) -> None:
     bare = replace(robot_2r, visual_model=type(robot_2r.visual_model)(), collision_model=type(
         robot_2r.collision_model)(), wheels=())  # fmt: skip
-    (body,) = Silhouette(bare, "ee").at(bare.q()).body
-    np.testing.assert_allclose(body[:, :2].mean(axis=0), 0.0, atol=1e-12)
+    plate = Silhouette(bare, "ee").at(bare.q()).main[:, :2]
+    assert np.all(plate.min(axis=0) < -0.15)
+    assert np.all(plate.max(axis=0) > 0.15)
 
 
 def test_hull_is_the_convex_hull(rng: np.random.Generator) -> None:

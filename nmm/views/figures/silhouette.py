@@ -20,6 +20,7 @@ from nmm.views.figures.views import ABOVE, View
 from nmm.views.playback.extent import corners
 from nmm.views.playback.placements import Placements, joint_screw
 from nmm.views.playback.rolling import Rolling
+from nmm.views.playback.sticks import appearance
 
 Color: TypeAlias = str | tuple[float, float, float]
 #: A joint that is not farther beside its link's axis than this stands on a column, m.
@@ -122,11 +123,6 @@ class Silhouette:
             for joint, wheel in ((display.getJointId(wheel.joint), wheel) for wheel in robot.wheels)
             if not wheel.swivel or wheel.swivel in self._rolling.steered
         ]
-        if not self._body:
-            tyres = [
-                tyre(one.radius, one.axis) + one.center for one in robot.wheels if one.carrier == "theta"
-            ]
-            self._body = [Solid(self._root, neutral_outline(tyres))]
         self._heading = _heading_mark(self._body, self._root) if own else np.zeros((0, 3))
         self._tips = _tips(robot, self._arm, frame)
         self._feet = _feet(robot, self._arm)
@@ -207,8 +203,6 @@ def _feet(robot: Robot, arm: Sequence[int]) -> list[tuple[int, Array]]:
 _DIRECTIONS = 200
 #: Points on a circle that stands for a round edge.
 _AROUND = 28
-#: Half width and half length of the neutral outline of a platform without shapes, m.
-_NEUTRAL = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,17 +214,15 @@ class Solid:
 
 
 def platform_shapes(robot: Robot, platform: Sequence[int]) -> list[Solid]:
-    """The visual shapes on the platform's joints, or else the collision shapes."""
-    names = {robot.model.names[joint]: joint for joint in platform}
-    visual, collision = robot.shapes
-    for model, geometry in ((robot.display_model, visual), (robot.model, collision)):
-        carried = [shape for shape in geometry.geometryObjects if model.names[shape.parentJoint] in names]
-        read_meshes(carried, robot.name)  # not the arm's, which is drawn as lines
-        if carried:
-            return _outermost(
-                [Solid(names[model.names[shape.parentJoint]], _shape_points(shape)) for shape in carried]
-            )
-    return []
+    """The shapes on the platform's joints, as a page draws them: of a root link without any a plate."""
+    model, names = robot.display_model, {robot.model.names[joint]: joint for joint in platform}
+    carried = [
+        (names[model.names[shape.parentJoint]], shape)
+        for shape in appearance(robot).shapes.geometryObjects
+        if model.names[shape.parentJoint] in names
+    ]
+    read_meshes([shape for _, shape in carried], robot.name)  # not the arm's, which is drawn as lines
+    return _outermost([Solid(joint, _shape_points(shape)) for joint, shape in carried])
 
 
 def outline_points(geometry: Any) -> Array | None:
@@ -299,16 +291,6 @@ def tyre(radius: float, along: Array) -> Array:
     first /= np.linalg.norm(first)
     R = np.column_stack([first, np.cross(along, first), along])
     return _cylinder(radius, 0.25 * radius) @ R.T
-
-
-def neutral_outline(wheels: list[Array]) -> Array:
-    """A box around the wheels, or of a neutral size without wheels."""
-    if not wheels:
-        return corners(np.array([[-_NEUTRAL, -_NEUTRAL, 0.0], [_NEUTRAL, _NEUTRAL, _NEUTRAL]]))
-    points = np.vstack(wheels)
-    low, high = points.min(axis=0), points.max(axis=0)
-    ahead = max(high[0], 0.5 * (high[1] - low[1]))
-    return corners(np.array([[low[0], low[1], 0.0], [ahead, high[1], high[2]]]))
 
 
 def hull(points: Array) -> Array:
