@@ -16,7 +16,6 @@ from nmm.control.functions.tasks import CallableFunction, Position
 from nmm.model.robots.loading import load
 from nmm.model.robots.robot import Robot
 from nmm.plugins.symbolic.search.family import values_text
-from nmm.plugins.symbolic.search.many_starts import find_singularities
 from nmm.plugins.symbolic.search.nearest import nearest_singularity
 
 Array = NDArray[np.float64]
