@@ -174,7 +174,7 @@ class FromPlan(Function):
 
     def apart(self, t: ArrayLike, q: ArrayLike) -> Array:
         """How far configurations (N, n) are from the plan at their times (N,), s: (N, 2), m and rad."""
-        off = differences(self.robot, np.asarray(q, dtype=np.float64), self.planned(np.asarray(t)))
+        off = self.robot.short_way(np.asarray(q, dtype=np.float64) - self.planned(np.asarray(t)))
         return np.array([error_sizes(one, self.robot.q_units) for one in off]).reshape(-1, 2)
 
     def shown(self) -> Shown:
@@ -264,11 +264,6 @@ class Renewed(Renewal):
         left = begun + last.duration - end
         if self._made and left > KNOT:
             yield Finding("plan_cut", {"left": left}, {"t": end})
-
-
-def differences(robot: Robot, q: Array, there: Array) -> Array:
-    """q - there (N, n) by the short way round; one of the two may be a single (n,)."""
-    return robot.short_way(q - there)
 
 
 def left_inverses(robot: Robot, times: Array, q: Array, u: Array, tau: float, length: float) -> Array:

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from nmm.base.arrays import Array, Integers
+from nmm.base.arrays import Array
 from nmm.control.limits.limits import LimitsOn
 from nmm.model.robots.zero_order_hold import inputs_of
 from nmm.plugins.planning.collisions.legs_check import MARGIN
@@ -69,7 +69,7 @@ class HeldTiming:
         robot, limits, p = self.robot, self.limits, self.held.platform
         rates = np.array([self.held.tangent(q, self._platform_rates(q, leg)) for q in nodes])
         driven = inputs_of_leg(robot, nodes[0], leg)
-        moved, arm = robot.rate_coordinates, self._arm_inputs()
+        moved, arm = robot.rate_coordinates, np.flatnonzero(robot.rate_coordinates >= p)
         U = np.tile(driven, (len(nodes), 1))
         U[:, arm] = rates[:, moved[arm]]
         change = np.gradient(rates, share, axis=0, edge_order=2 if len(share) > 2 else 1)
@@ -129,9 +129,6 @@ class HeldTiming:
         first = self.held.platform
         off = np.abs(q.reshape(straight.shape) - straight)[:, :, first:].reshape(-1, self.robot.n - first)
         return float((off @ self.held.check.levers[:, 3 + first :].T).max(initial=0.0)) <= ROUND
-
-    def _arm_inputs(self) -> Integers:
-        return np.flatnonzero(self.robot.rate_coordinates >= self.held.platform)
 
     def _platform_rates(self, q: Array, leg: Array) -> Array:
         """What a leg's twist does to the platform's coordinates at q, (n_p,), per share."""

@@ -23,7 +23,6 @@ from nmm.motion.disturbances import Disturbances
 from nmm.motion.trajectory import Outcome, Trajectory
 from nmm.motion.verdict import Verdict
 from nmm.plugins.planning.collisions.motion_check import MotionCheck
-from nmm.plugins.planning.following import differences
 from nmm.plugins.planning.goals import TaskError, goal_task
 from nmm.plugins.planning.interior import SHOOT, shoot
 from nmm.plugins.planning.plan import Plan
@@ -277,11 +276,11 @@ class Horizon:
                 x.aims[k], x.aimed[k] = -error_q, error - error_q @ q
             return
         near = np.minimum(self._along + np.linspace(0.0, WINDOW, POINTS), self.plan.duration)
-        off = differences(self.robot, self.plan(near)[0], x.q[0])
+        off = self.robot.short_way(self.plan(near)[0] - x.q[0])
         self._along = float(near[np.einsum("ki,ki->k", off, off).argmin()])
         x.aims[:], x.pull[:] = np.eye(n), ALONG
         wanted = self.plan(self._along + self._times)[0]
-        x.aimed[:] = wanted + (differences(self.robot, wanted[:1], x.q[0]) - (wanted[0] - x.q[0]))
+        x.aimed[:] = wanted + (self.robot.short_way(wanted[:1] - x.q[0]) - (wanted[0] - x.q[0]))
         x.goal[:] = x.aimed[-1]
         x.ends[:n] = END * (self._along + NEAR * self._times[-1] > self.plan.duration)
 

@@ -14,7 +14,6 @@ from nmm.base.arrays import Array, counted, positive, scalar
 from nmm.base.errors import InputError, expect_kind
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.platforms.tractor import Tractor
-from nmm.plugins.planning.following import differences
 from nmm.plugins.planning.plan import Plan
 from nmm.plugins.planning.planned import finished
 from nmm.plugins.planning.search import STEP, Search
@@ -107,7 +106,7 @@ def _rest(plan: Plan, q: Array, t: float | None) -> list[Array]:
     and between, at most `STEP` s apart."""
     if t is None:
         times = np.arange(0.0, plan.duration + NEAR, NEAR)
-        off = differences(plan.robot, plan(times)[0], q)
+        off = plan.robot.short_way(plan(times)[0] - q)
         t = float(times[np.einsum("ki,ki->k", off, off).argmin()])
     begin = min(max(scalar(t, "t"), 0.0), plan.duration)
     stops = [begin, *(one for one in plan.stops if one > begin)]

@@ -45,7 +45,8 @@ class Standing:
         names aside."""
         margin, shifts = self._moved(q)
         robot, p, of_file = self.robot, self.robot.platform.p, accelerations_of(self.robot)
-        usual = np.array([*self._of_platform(q), *self._of_joints()])
+        joints = [_STRAIGHT if unit == "m/s" else _TURNING for unit in robot.u_units[p:]]
+        usual = np.array([*self._of_platform(q), *joints])
         usual = np.array([of_file.get(name, one) for name, one in zip(robot.u_names, usual, strict=True)])
         with np.errstate(divide="ignore", invalid="ignore"):
             tipping = np.where(shifts > 0.0, max(margin, 0.0) / (_SAFE * shifts), np.inf)
@@ -70,10 +71,6 @@ class Standing:
         speeds = np.maximum(np.hypot(*moved[:2]), _BESIDE * np.abs(moved[2]))
         with np.errstate(divide="ignore"):
             return np.asarray(np.where(speeds > 1e-6, _STRAIGHT / speeds, _TURNING))
-
-    def _of_joints(self) -> list[float]:
-        units = self.robot.u_units[self.robot.platform.p :]
-        return [_STRAIGHT if unit == "m/s" else _TURNING for unit in units]
 
     def _moved(self, q: Array) -> tuple[float, Array]:
         """The margin at rest, m, and how far an acceleration of 1 of each input moves the zero-moment point,

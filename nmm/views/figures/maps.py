@@ -144,15 +144,11 @@ def _dress(axes: Axes, drawn: Map, *, named: bool) -> None:
             if span > 4.0 * np.pi:
                 part = float(np.ceil(span / (4.0 * np.pi))) * 2.0
             axis.set_major_locator(MultipleLocator(part * np.pi / 2))
-            axis.set_major_formatter(FuncFormatter(_in_pi))
+            pi = FuncFormatter(lambda x, _: fraction_of_pi(x, (1, 2, 4, 8, 16)).replace("-", "−"))  # 3π/4
+            axis.set_major_formatter(pi)
         else:
             axis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 2.5, 5, 10]))
             axis.set_major_formatter(style.plain())
-
-
-def _in_pi(value: float, _: int | None) -> str:
-    """An angle of a tick as a multiple of π: −π/2, 0, 3π/4."""
-    return fraction_of_pi(value, (1, 2, 4, 8, 16)).replace("-", "−")
 
 
 def subscripted(symbol: str) -> str:

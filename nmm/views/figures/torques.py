@@ -26,7 +26,8 @@ def torques(found: Torques, *, width: float = style.PAGE) -> Figure:
     limited = np.isfinite(found.efforts)
     shares = found.torques / np.where(limited, found.efforts, 1.0)
     parts: Mapping[str, list[int]] = style.groups(["limited" if one else "free" for one in limited])
-    heads = {"limited": "torque, share of limit", "free": f"torque [{style.units(_units(found, ~limited))}]"}
+    free = (unit for unit, one in zip(found.dynamics.actuators.units, limited, strict=True) if not one)
+    heads = {"limited": "torque, share of limit", "free": f"torque {style.units(free)}"}
     shown = {name: parts[name] for name in heads if name in parts}
     tips = bool(np.isfinite(found.margins).all())
     legends = [[resolver_style.pretty(found.names[j]) for j in columns] for columns in shown.values()]
@@ -45,8 +46,3 @@ def torques(found: Torques, *, width: float = style.PAGE) -> Figure:
         panels[-1].set_ylim(min(0.0, 1.1 * float(found.margins.min())), None)
         style.finish(panels[-1], found.t, "tip margin [m]", ticks=False)
     return style.aligned(made)
-
-
-def _units(found: Torques, which: np.ndarray) -> list[str]:
-    units = found.dynamics.actuators.units
-    return [units[j] for j in np.flatnonzero(which)]
