@@ -2,7 +2,6 @@
 cell keeps the best one offered for it so far."""
 
 import itertools
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -12,7 +11,6 @@ from nmm.analysis.maps.measures import Evaluator
 from nmm.analysis.maps.reach import Reach
 from nmm.base.arrays import Array, Flags, Integers
 from nmm.base.errors import InputError
-from nmm.base.kernels.compiled import compiled
 from nmm.base.progress import Progress, between
 
 #: Sides of the blocks, in cells, through which good postures spread. In each sweep, a block's best posture is
@@ -29,30 +27,6 @@ NEAR = 1e-7
 #: cells branches are carried.
 BENT, SWEEPS = 3e-3, 40
 BESIDE = ((0, 1), (0, -1), (1, 0), (-1, 0))
-
-
-@compiled
-def find_promising(
-    values: Array, columns: int, down: int, right: int, margin: float, tried: Array, found: Integers
-) -> int:
-    """See `Layer.promising`; found (2, cells): the cells and their neighbours, as many as returned."""
-    count, rows = 0, values.shape[0] // columns
-    for cell in range(values.shape[0]):
-        value = values[cell]
-        row, column = cell // columns + down, cell % columns + right
-        if not math.isfinite(value) or row < 0 or row >= rows or column < 0 or column >= columns:
-            continue
-        other, earlier = row * columns + column, cell - down * columns - right
-        if not math.isfinite(values[other]):
-            continue
-        # Where it wraps round into another row, the worst that comes of it is an idle try.
-        known = 0 <= earlier < values.shape[0] and math.isfinite(values[earlier])
-        change = value - values[earlier] if known else 0.0
-        if value + change > values[other] + margin and tried[other] != value:
-            found[0, count], found[1, count] = cell, other
-            tried[other] = value
-            count += 1
-    return count
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,9 +115,18 @@ class Layer:
 
         `tried`, which is updated, holds the cell's value when each neighbour was last tried from this side.
         """
-        found = np.empty((2, len(self.values)), dtype=np.int64)
-        count = find_promising(self.values, self.grid.columns, *side, margin, tried, found)
-        return found[0, :count].copy(), found[1, :count].copy()
+        every = np.arange(len(self.values))
+        inside, others = self.grid.beside(every, side)
+        value, other = self.values[inside], self.values[others]
+        # Where it wraps round into another row, the worst that comes of it is an idle try.
+        earlier = every[inside] - side[0] * self.grid.columns - side[1]
+        known = (earlier >= 0) & (earlier < len(every))
+        before = np.where(known, self.values[earlier * known], -np.inf)
+        with np.errstate(invalid="ignore"):  # infinite: not reached
+            change = np.where(np.isfinite(before), value - before, 0.0)
+            better = np.isfinite(value + other) & (value + change > other + margin) & (tried[others] != value)
+        tried[others[better]] = value[better]
+        return every[inside][better], others[better]
 
 
 class Search:
