@@ -16,7 +16,7 @@ from nmm.base.errors import expect
 from nmm.model.robots.frame_path import FramePath
 from nmm.motion.trajectory import Trajectory
 from nmm.views.figures import style
-from nmm.views.figures.seen_points import SeenPoints, few
+from nmm.views.figures.seen_points import SeenPoints
 from nmm.views.figures.silhouette import Ink, Pose, Silhouette, hull, outline_points
 from nmm.views.figures.time_labels import SIZE, Ground, Place, Subject, places
 from nmm.views.figures.views import ABOVE, View, Viewed, page, upright
@@ -271,15 +271,15 @@ def _instants(t: Array, instants: ArrayLike | int) -> Array:
 
 
 def _lines(trajectory: Trajectory) -> dict[str, Array]:
-    """The paths to draw, (k, 3) each, with few enough points."""
+    """The paths to draw, (k, 3) each."""
     if trajectory.path is None:
-        x_y = few(base_position(trajectory.robot, trajectory.q))
+        x_y = base_position(trajectory.robot, trajectory.q)
         return {"path": np.column_stack([x_y, np.zeros(len(x_y))])}
-    found = {"path": few(trajectory.path)}
+    found = {"path": trajectory.path}
     if trajectory.moving is not None:
-        found["desired"] = few(trajectory.moving)
+        found["desired"] = trajectory.moving
     if trajectory.believed is not None and trajectory.frame is not None:
-        found["believed"] = FramePath(trajectory.robot, trajectory.frame).positions(few(trajectory.believed))
+        found["believed"] = FramePath(trajectory.robot, trajectory.frame).positions(trajectory.believed)
     return found
 
 

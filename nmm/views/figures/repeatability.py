@@ -17,7 +17,6 @@ LOWEST = 1e-16
 DRIFT, PATHS = 1.9, 4.6
 #: Drifts that differ by less than this factor are drawn on a linear scale.
 MUCH = 30.0
-POINTS = 1500
 
 
 def laps(found: Repeatability, *, width: float = style.PAGE) -> Figure:
@@ -73,10 +72,9 @@ def _draw_paths(axes: Axes, runs: list[Laps], worn: list[resolver_style.Look], w
         axes.plot(*desired.T, ":", color=resolver_style.BLACK, linewidth=1.1, label=next(names))
     for one, look in zip(runs, worn, strict=True):
         path, samples = _path(one), _samples(one)
-        every = max(1, samples // POINTS)
         last = path[len(path) - 1 - samples :]
-        axes.plot(*path[::every].T, look.dashes, color=look.color, linewidth=0.7, alpha=0.6)
-        axes.plot(*last[::every].T, look.dashes, color=look.color, linewidth=1.9, label=next(names))
+        axes.plot(*path.T, look.dashes, color=look.color, linewidth=0.7, alpha=0.6)
+        axes.plot(*last.T, look.dashes, color=look.color, linewidth=1.9, label=next(names))
         axes.plot(*one.q[:, :2].T, "o", color=look.color, markersize=3.5, linestyle="none")
     (left, low), (right, high) = _limits(runs)
     axes.set(xlim=(left, right), ylim=(low, high))

@@ -16,12 +16,6 @@ _MOVING, _STANDS = "path of what is seen", "seen point"
 _RESTS = 1e-6
 
 
-def few(points: Array) -> Array:
-    """About 1500 of the points (N, 3), including both ends."""
-    last = len(points) - 1
-    return points[np.unique([*range(0, len(points), max(1, len(points) // 1500)), last])]
-
-
 class SeenPoints:
     """Those of runs, each once; of several runs those that are the same in all.
 
@@ -38,7 +32,7 @@ class SeenPoints:
         shared = [point for point in seen.swapaxes(0, 1) if all(_has(run, point) for run in runs[1:])]
         moves = [bool(np.ptp(point, axis=0).max() > _RESTS) for point in shared]
         moving = [point for point, does in zip(shared, moves, strict=True) if does]
-        self.lines = [few(point) for point in moving]
+        self.lines = moving
         standing = [point[0] for point, does in zip(shared, moves, strict=True) if not does]
         self.marks = np.array(standing).reshape(-1, 3)
         wanted = np.zeros(0) if times is None else times
