@@ -222,7 +222,14 @@ def platform_shapes(robot: Robot, platform: Sequence[int]) -> list[Solid]:
         if model.names[shape.parentJoint] in names
     ]
     read_meshes([shape for _, shape in carried], robot.name)  # not the arm's, which is drawn as lines
-    return _outermost([Solid(joint, _shape_points(shape)) for joint, shape in carried])
+    outlines = ((joint, outline_points(shape.geometry), shape.placement) for joint, shape in carried)
+    return _outermost(
+        [
+            Solid(joint, points @ np.array(place.rotation).T + np.array(place.translation))
+            for joint, points, place in outlines
+            if points is not None
+        ]
+    )
 
 
 def outline_points(geometry: Any) -> Array | None:
@@ -234,17 +241,7 @@ def outline_points(geometry: Any) -> Array | None:
         k = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _AROUND // 2 + 1)
         radius, lift = float(geometry.radius), float(geometry.halfLength) if name == "Capsule" else 0.0
         return np.vstack([_cylinder(radius * np.cos(a), lift + radius * np.sin(a)) for a in k[k >= 0.0]])
-    return _geometry_points(geometry)
-
-
-def _shape_points(shape: Any) -> Array:
-    """Points whose convex hull is that of a Pinocchio geometry object, in its joint's frame."""
-    points = _geometry_points(shape.geometry)
-    return points @ np.array(shape.placement.rotation).T + np.array(shape.placement.translation)
-
-
-def _geometry_points(geometry: Any) -> Array:
-    if type(geometry).__name__ == "Cylinder":
+    if name == "Cylinder":
         return _cylinder(float(geometry.radius), float(geometry.halfLength))
     if hasattr(geometry, "vertices") or hasattr(geometry, "points"):
         vertices = geometry.vertices() if hasattr(geometry, "vertices") else geometry.points()
