@@ -77,7 +77,7 @@ class PlaceOfOptions:
             if group is None:
                 continue
             fits = isinstance(group, type) and issubclass(group, OptionGroup) and is_dataclass(group)
-            names = {one.name for one in fields(group)} if fits else set()
+            names = {field.name for field in fields(group)} if fits else set()
             if not fits or names & taken:
                 what = (
                     f"options that are there: {listed(sorted(names & taken))}" if fits else "no OptionGroup"
@@ -95,24 +95,27 @@ def command(function: Callable[..., int | None]) -> Callable[..., int | None]:
     From Python it is called with the options: `redundancy("unicycle_2r", task=["position"])`.
     """
     own = _typed(function)
-    places = {name: place for name, one in own.items() if (place := _place_of(one.annotation)) is not None}
+    hints = {name: parameter.annotation for name, parameter in own.items()}
+    places = {name: place for name, hint in hints.items() if (place := _place_of(hint)) is not None}
     groups: dict[str, Sequence[type[Any]]] = {
-        name: [one.annotation]
-        for name, one in own.items()
-        if isinstance(one.annotation, type) and is_dataclass(one.annotation)
+        name: [hint] for name, hint in hints.items() if isinstance(hint, type) and is_dataclass(hint)
     }
     taken = own.keys() - groups.keys() - places.keys()
     taken |= {field.name for (group,) in groups.values() for field in fields(group)}
     groups |= {name: place.groups(taken) for name, place in places.items()}
     parameters = [
         parameter
-        for name, one in own.items()
-        for parameter in ([one] if name not in groups else _options(groups[name]))
+        for name, own_parameter in own.items()
+        for parameter in ([own_parameter] if name not in groups else _options(groups[name]))
     ]
     signature = inspect.Signature(
         [
-            one.replace(kind=one.POSITIONAL_OR_KEYWORD if one.default is one.empty else one.KEYWORD_ONLY)
-            for one in parameters
+            parameter.replace(
+                kind=parameter.POSITIONAL_OR_KEYWORD
+                if parameter.default is parameter.empty
+                else parameter.KEYWORD_ONLY
+            )
+            for parameter in parameters
         ]
     )
 
@@ -120,16 +123,16 @@ def command(function: Callable[..., int | None]) -> Callable[..., int | None]:
     def whole(*arguments: Any, **options: Any) -> int | None:
         bound = signature.bind(*arguments, **options)
         bound.apply_defaults()
-        given = {
+        values = {
             name: value.default if isinstance(value, ParameterInfo) else value
             for name, value in bound.arguments.items()
         }
         for name, several in groups.items():
             filled = tuple(
-                group(**{field.name: given.pop(field.name) for field in fields(group)}) for group in several
+                group(**{field.name: values.pop(field.name) for field in fields(group)}) for group in several
             )
-            given[name] = AddedOptions(filled) if name in places else filled[0]
-        return function(**given)
+            values[name] = AddedOptions(filled) if name in places else filled[0]
+        return function(**values)
 
     del whole.__wrapped__
     whole.__signature__ = signature  # type: ignore[attr-defined]  # what typer reads
@@ -143,7 +146,7 @@ def _place_of(hint: Any) -> PlaceOfOptions | None:
 
 
 def _options(groups: Sequence[type]) -> list[inspect.Parameter]:
-    return [one for group in groups for one in _typed(group).values()]
+    return [parameter for group in groups for parameter in _typed(group).values()]
 
 
 def _typed(made: Callable[..., Any]) -> dict[str, inspect.Parameter]:

@@ -81,11 +81,11 @@ class ScenePart(Part):
             with at("carried", i):
                 with at("frame"):
                     robot.frame_id(load.frame)
-                name, geometry, there = load.drawn()
-                carried.append(Carried(name, geometry, load.frame, there, load.mass or 0.0))
+                name, geometry, placement = load.drawn()
+                carried.append(Carried(name, geometry, load.frame, placement, load.mass or 0.0))
         for i, thing in enumerate(self.scenery):
             with at("scenery", i):
-                name, geometry, there = thing.drawn()
-                scenery.append(Body(name, geometry, there[np.newaxis]))
+                name, geometry, placement = thing.drawn()
+                scenery.append(Body(name, geometry, placement[np.newaxis]))
         camera = self.camera if isinstance(self.camera, str) else tuple(self.camera)
         return Surroundings(tuple(carried), tuple(scenery), camera, self.opens)

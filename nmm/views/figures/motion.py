@@ -132,8 +132,8 @@ class Scene(Viewed):
             # The farther out they stand, the smaller is all else drawn, and the larger are they beside it.
             scale = 1.1 * extent / width
             mains = [hull(view.of(pose.main)) for pose in self.poses]
-            solid = [hull(view.of(one.points)) for one in self.outlines if one.times]
-            subjects = [Subject(*one) for one in zip(self._times(), [*mains, *solid], strict=True)]
+            solid = [hull(view.of(outline.points)) for outline in self.outlines if outline.times]
+            subjects = [Subject(*pair) for pair in zip(self._times(), [*mains, *solid], strict=True)]
             ground = Ground(lambda axes: self._draw_scene(axes, view), low, high, scale)
             for _ in range(4):
                 scale = 1.1 * extent / width
@@ -275,12 +275,12 @@ def _lines(trajectory: Trajectory) -> dict[str, Array]:
     if trajectory.path is None:
         x_y = base_position(trajectory.robot, trajectory.q)
         return {"path": np.column_stack([x_y, np.zeros(len(x_y))])}
-    found = {"path": trajectory.path}
+    lines = {"path": trajectory.path}
     if trajectory.moving is not None:
-        found["desired"] = trajectory.moving
+        lines["desired"] = trajectory.moving
     if trajectory.believed is not None and trajectory.frame is not None:
-        found["believed"] = FramePath(trajectory.robot, trajectory.frame).positions(trajectory.believed)
-    return found
+        lines["believed"] = FramePath(trajectory.robot, trajectory.frame).positions(trajectory.believed)
+    return lines
 
 
 def _faded(color: str, strength: float) -> tuple[float, float, float]:
