@@ -42,7 +42,7 @@ class Bound:
         moving: Collection[str] = (),
         units: Mapping[str, str] | None = None,
     ) -> Finding:
-        """The bound in words, and whether it holds for values of the lengths, in m unless `units` says
+        """The bound as a finding, with whether it holds for lengths `values`, in m unless `units` says
         otherwise; `moving` are quantities that depend on the configuration and are never negative."""
         known = values or {}
         larger: list[tuple[Formula, Formula | None]] = []
@@ -50,27 +50,29 @@ class Bound:
             left = sympy_formula(a, known)
             size = left if b == 0 or left in moving else formula("|", left, "|")
             larger.append((size, sympy_formula(b, known) if b != 0 else None))
-        found: dict[str, Any] = {"minor": self.columns, "larger": larger}
-        found |= {"nonzero": self.nonzero, "exact": self.exact}
+        fields: dict[str, Any] = {"minor": self.columns, "larger": larger}
+        fields |= {"nonzero": self.nonzero, "exact": self.exact}
         if values is not None and (larger or self.nonzero):
             names = self._names
-            found["holds"] = self.holds(values)
-            if found["holds"] is None:
-                found["through"] = [name for name in moving if name in names]
+            fields["holds"] = self.holds(values)
+            if fields["holds"] is None:
+                fields["through"] = [name for name in moving if name in names]
             else:
                 used, units = (name for name in values if name in names), units or {}
-                found["here"] = {name: (values[name], units.get(name, "m")) for name in used}
-        return Finding("minor_never_zero", found)
+                fields["here"] = {name: (values[name], units.get(name, "m")) for name in used}
+        return Finding("minor_never_zero", fields)
 
     def reasons(self, values: Mapping[str, float]) -> tuple[Finding, ...]:
-        """Why it holds, "terms_bounded"; empty where lengths only have to differ from 0."""
-        terms = [tuple(sympy_formula(one, values) for one in pair) for pair in self.requires if pair[1] != 0]
+        """The proof, "terms_bounded"; empty where lengths only have to differ from 0."""
+        terms = [
+            tuple(sympy_formula(side, values) for side in pair) for pair in self.requires if pair[1] != 0
+        ]
         return (Finding("terms_bounded", {"terms": terms}),) if terms else ()
 
     @property
     def _names(self) -> set[str]:
-        found = {str(symbol) for pair in self.requires for one in pair for symbol in one.free_symbols}
-        return found | set(self.nonzero)
+        names = {str(symbol) for pair in self.requires for side in pair for symbol in side.free_symbols}
+        return names | set(self.nonzero)
 
     def holds(self, values: Mapping[str, float]) -> bool | None:
         """Whether the conditions hold for these values; None when they involve further quantities."""
@@ -85,11 +87,11 @@ class Bound:
 
 
 def sympy_formula(expression: Any, values: Mapping[str, float]) -> Formula:
-    """A SymPy expression as it is shown; |l1| is written l1 where l1 is above 0."""
+    """Format a SymPy expression; |l1| is written l1 where l1 is above 0."""
     plain = expression.replace(
         sympy.Abs, lambda of: of if values.get(str(of), -1.0) > 0.0 else sympy.Abs(of, evaluate=False)
     )
-    names = {one: symbol(str(one)).latex for one in plain.free_symbols}
+    names = {leaf: symbol(str(leaf)).latex for leaf in plain.free_symbols}
     text = _Text().doprint(plain).replace("**", "^").replace("*", " ")
     return Formula(text, sympy.latex(plain, symbol_names=names, fold_short_frac=True))
 
@@ -105,18 +107,18 @@ def lower_bound(analysis: SymbolicAnalysis) -> Claim | None:
     If C is a product of lengths, J never loses rank.
     """
     derivation, ring = analysis.derivation, analysis.derivation.ring
-    if any(one.variables() for one in derivation.row_denominators):
+    if any(denominator.variables() for denominator in derivation.row_denominators):
         return None
     below = zip(analysis.u_names, derivation.column_denominators, strict=True)
-    divided = {name for name, one in below if one.variables()}
+    divided = {name for name, denominator in below if denominator.variables()}
     columns = [key for key, value in analysis.numerators.items() if value and divided.isdisjoint(key)]
     if not columns:
         return None
     moving = {i for i, name in enumerate(ring.names) if ring.is_angle[i] or name not in analysis.geometry}
     terms = [analysis.numerators[name].terms for name in columns]
-    keys = sorted({key for one in terms for key in one if any(i in moving for i, _ in key)})
+    keys = sorted({key for poly in terms for key in poly if any(i in moving for i, _ in key)})
     rows = [
-        [sympy.Rational(*one[key][part].as_integer_ratio()) if key in one else 0 for one in terms]
+        [sympy.Rational(*poly[key][part].as_integer_ratio()) if key in poly else 0 for poly in terms]
         for key in keys
         for part in (0, 1)
     ]
@@ -148,11 +150,11 @@ def lower_bound(analysis: SymbolicAnalysis) -> Claim | None:
 def never_zero(analysis: SymbolicAnalysis) -> dict[tuple[str, ...], Bound]:
     """The minors that vanish nowhere under a condition on the lengths, and the condition.
 
-    A sum as a factor vanishes nowhere if its term without coordinates exceeds what the others can reach, with
-    cosines and sines at most 1; otherwise it vanishes somewhere, if these can be reached independently. A
-    minor with a cosine or sine as a factor is not listed.
+    A factor that is a sum vanishes nowhere if its term without coordinates exceeds the sum of the others'
+    bounds, with cosines and sines at most 1; otherwise it vanishes somewhere, if each reaches its bound
+    independently. A minor with a cosine or sine as a factor is not listed.
     """
-    found = {}
+    bounds = {}
     for columns, form in analysis.minor_forms.items():
         if not form.number:
             continue
@@ -172,8 +174,8 @@ def never_zero(analysis: SymbolicAnalysis) -> dict[tuple[str, ...], Bound]:
             requires.append(condition)
             exact = exact and isinstance(factor, Sum) and _attained(factor, analysis)
         else:
-            found[columns] = Bound(columns, tuple(requires), tuple(nonzero), exact)
-    return found
+            bounds[columns] = Bound(columns, tuple(requires), tuple(nonzero), exact)
+    return bounds
 
 
 def vanishing(analysis: SymbolicAnalysis) -> dict[tuple[str, ...], Finding]:
@@ -182,10 +184,10 @@ def vanishing(analysis: SymbolicAnalysis) -> dict[tuple[str, ...], Finding]:
     Joint limits are ignored. Such a minor is 0, or has as a factor a coordinate, a cosine or sine, or a sum
     whose mean over all angles is 0, which takes both signs and so 0 between them.
     """
-    found: dict[tuple[str, ...], Finding] = {}
+    findings: dict[tuple[str, ...], Finding] = {}
 
     def add(columns: tuple[str, ...], **values: Any) -> None:
-        found[columns] = Finding("minor_vanishing", {"minor": columns, **values})
+        findings[columns] = Finding("minor_vanishing", {"minor": columns, **values})
 
     for columns, form in analysis.minor_forms.items():
         if not form.number:
@@ -203,7 +205,7 @@ def vanishing(analysis: SymbolicAnalysis) -> dict[tuple[str, ...], Finding]:
                 of = condition(alone(factor), analysis.named_forms)
                 add(columns, factor=of, mean_zero=not isinstance(factor, Trig))
                 break
-    return found
+    return findings
 
 
 def _angles(analysis: SymbolicAnalysis) -> list[str]:

@@ -83,35 +83,37 @@ def singular_set(analysis: SymbolicAnalysis, zero: Sequence[str] = ()) -> Claim:
     vanish = [
         columns for columns, form in forms.items() if any(alone(f) in domain.zero for f, _ in form.factors)
     ]
-    zero_formulas = [condition(one, {}) for one in domain.zero]
+    zero_formulas = [condition(quantity, {}) for quantity in domain.zero]
     steps = [Finding("minors_zero", {"minors": vanish, "zero": zero_formulas})] if vanish else []
     forms = {columns: form for columns, form in forms.items() if columns not in vanish}
     if not forms:
         nowhere = domain._replace(nonzero=[])
-        return Claim(Finding("rank_lost", {"rank": s, **nowhere.said(analysis)}), tuple(steps))
+        return Claim(Finding("rank_lost", {"rank": s, **nowhere.assumptions(analysis)}), tuple(steps))
     try:
         needed = _nowhere(list(forms.values()), domain)
         if needed is not None:
-            steps.append(Finding("nullstellensatz", _some(divided=[inline(one) for one in needed.nonzero])))
-            return Claim(Finding("rank_full", {"rank": s, **needed.said(analysis)}), tuple(steps))
+            steps.append(Finding("nullstellensatz", _some(divided=[inline(f) for f in needed.nonzero])))
+            return Claim(Finding("rank_full", {"rank": s, **needed.assumptions(analysis)}), tuple(steps))
         cases = Cases(analysis, forms, domain)
     except Undecided:
         return Claim(Finding("rank_undecided", _some(gone=gone)))
     steps += cases.steps
-    said = domain.said(analysis)
+    assumptions = domain.assumptions(analysis)
     if not cases.families:
-        return Claim(Finding("rank_full", {"rank": s, **said}), tuple(steps))
-    conditions = [[condition(one, analysis.named_forms) for one in family] for family in cases.families]
+        return Claim(Finding("rank_full", {"rank": s, **assumptions}), tuple(steps))
+    conditions = [[condition(factor, analysis.named_forms) for factor in family] for family in cases.families]
     factors = [in_names(factor, analysis.named_forms) for family in cases.families for factor in family]
     used = {leaf.name for leaf in leaves(*factors) if isinstance(leaf, Symbol)}
     named = {name: inline(form) for name, form in analysis.named_forms.items() if name in used}
-    statement = Finding("rank_except", {"rank": s, "families": conditions, "named": named, **said})
+    statement = Finding("rank_except", {"rank": s, "families": conditions, "named": named, **assumptions})
     families = tuple(
         tuple(to_sympy(factor, analysis.symbols) for factor in family) for family in cases.families
     )
     vanishing = families[0]
     if len(families) > 1:  # a product that vanishes exactly in the union of the families
-        sums = [one[0] if len(one) == 1 else sympy.Add(*(part**2 for part in one)) for one in families]
+        sums = [
+            family[0] if len(family) == 1 else sympy.Add(*(part**2 for part in family)) for family in families
+        ]
         vanishing = (sympy.Mul(*sums),)
     return Claim(statement, tuple(steps), vanishing, families)
 
@@ -131,15 +133,15 @@ class Domain(NamedTuple):
     def zeros(self, products: Sequence[Product], limits: Limits | None = None) -> Zeros:
         return Zeros(products, [*self.nonzero, *self.below], limits, self.zero)
 
-    def said(self, analysis: SymbolicAnalysis) -> dict[str, Any]:
-        """The domain as values of a finding; auxiliary quantities are apart, as they depend on q."""
+    def assumptions(self, analysis: SymbolicAnalysis) -> dict[str, Any]:
+        """The domain as values of a finding; auxiliary quantities, which depend on q, are "moving"."""
         moving = [alone(Symbol(name)) for name in analysis.definitions]
         return _some(
             gone=list(analysis.derivation.zero),
-            zero=[condition(one, {}) for one in self.zero],
-            nonzero=[condition(one, {}) for one in self.nonzero if one not in moving],
-            moving=[inline(one) for one in self.nonzero if one in moving],
-            exists=[condition(one, analysis.named_forms) for one in self.below],
+            zero=[condition(quantity, {}) for quantity in self.zero],
+            nonzero=[condition(quantity, {}) for quantity in self.nonzero if quantity not in moving],
+            moving=[inline(quantity) for quantity in self.nonzero if quantity in moving],
+            exists=[condition(divisor, analysis.named_forms) for divisor in self.below],
         )
 
 
@@ -152,18 +154,18 @@ def _domain(analysis: SymbolicAnalysis, forms: Sequence[Product]) -> Domain:
         if is_constant(factor, analysis.geometry) and not isinstance(factor, Symbol):
             value = float(to_sympy(alone(factor), symbols).subs(values))
             (zero if abs(value) < NOTHING else nonzero)[alone(factor)] = None
-    denominators = [alone(one) for value in analysis.denominators for one, _ in factored(value).factors]
-    below = [one for one in denominators if not isinstance(one.factors[0][0], Symbol) and one not in nonzero]
+    denominators = [alone(factor) for value in analysis.denominators for factor, _ in factored(value).factors]
+    below = [d for d in denominators if not isinstance(d.factors[0][0], Symbol) and d not in nonzero]
     divisible = [*analysis.numerators.values(), *analysis.denominators]
     used = {ring.names[i] for value in divisible for i in value.variables() if not ring.is_angle[i]}
-    may_vanish = {one.name for one in analysis.derivation.auxiliaries if one.kind == "share"}
+    may_vanish = {aux.name for aux in analysis.derivation.auxiliaries if aux.kind == "share"}
     lengths = used & {*analysis.geometry, *analysis.definitions} - may_vanish
     names = [alone(Symbol(name)) for name in ring.names if name in lengths]
-    return Domain([*names, *nonzero], list(dict.fromkeys(below)), [one for one in zero if one not in below])
+    return Domain([*names, *nonzero], list(dict.fromkeys(below)), [f for f in zero if f not in below])
 
 
 def _nowhere(forms: Sequence[Product], domain: Domain) -> Domain | None:
-    """The domain with only what the minors need to have no common zero; None when they may have one."""
+    """The domain reduced to what keeps the minors from a common zero; None when they may have one."""
 
     def empty(nonzero: list[Product]) -> bool:
         try:
@@ -176,7 +178,7 @@ def _nowhere(forms: Sequence[Product], domain: Domain) -> Domain | None:
     if not empty(needed):
         return None
     for quantity in reversed(domain.nonzero):
-        fewer = [one for one in needed if one != quantity]
+        fewer = [other for other in needed if other != quantity]
         needed = fewer if empty(fewer) else needed
     return domain._replace(nonzero=needed)
 
@@ -198,7 +200,7 @@ class Cases:
             (
                 columns,
                 inline(analysis.short_forms[columns]),
-                [alone(one) for one, power in form.factors if power > 0 and alone(one) not in known],
+                [alone(factor) for factor, power in form.factors if power > 0 and alone(factor) not in known],
             )
             for columns, form in forms.items()
         ]
@@ -206,13 +208,13 @@ class Cases:
         self.families = [self._plain(family) for family in self.families]
         self._drop_parts()
 
-    def _case(self, given: list[Product], basis: Basis) -> None:
+    def _case(self, vanishing: list[Product], basis: Basis) -> None:
         self._count += 1
         if self._count > _CASES:
             raise Undecided
         for family in self.families:
             if all(self._zeros.vanishes(factor, basis) for factor in family):
-                self._step("case_covered", given, family=self._shown(family))
+                self._step("case_covered", vanishing, family=self._shown(family))
                 return
         left = [minor for minor in self._minors if not any(self._zeros.contains(f, basis) for f in minor[2])]
         while left:  # the easy question is answered; the hard one only for the minor that is taken
@@ -221,22 +223,22 @@ class Cases:
             if not hidden:
                 break
             basis = self._zeros.within(basis, hidden[0])
-            left = [one for one in left if not any(self._zeros.contains(f, basis) for f in one[2])]
+            left = [other for other in left if not any(self._zeros.contains(f, basis) for f in other[2])]
         if not left:
-            self._step("case_singular", given)
-            self.families.append(given)
+            self._step("case_singular", vanishing)
+            self.families.append(vanishing)
             return
         columns, form, factors = minor
         if not factors:
-            self._step("case_regular", given, minor=columns, form=form)
+            self._step("case_regular", vanishing, minor=columns, form=form)
             return
         possible = [(factor, self._zeros.within(basis, factor)) for factor in factors]
         ways = self._shown([factor for factor, inside in possible if not inside.is_one])
         excluded = self._shown([factor for factor, inside in possible if inside.is_one])
-        self._step("case_split", given, minor=columns, form=form, ways=ways, excluded=excluded)
+        self._step("case_split", vanishing, minor=columns, form=form, ways=ways, excluded=excluded)
         for factor, inside in possible:
             if not inside.is_one:
-                self._case([*given, factor], inside)
+                self._case([*vanishing, factor], inside)
 
     def _plain(self, family: list[Product]) -> list[Product]:
         """The same set by fewer and simpler factors: cosines and sines of single angles where possible."""
@@ -248,13 +250,13 @@ class Cases:
         chosen: list[Product] = []
         inside = zeros.everywhere
         for factor in [*single, *sorted(family, key=lambda factor: len(condition(factor, {})))]:
-            if all(zeros.vanishes(one, inside) for one in family):
+            if all(zeros.vanishes(f, inside) for f in family):
                 break
             if not zeros.vanishes(factor, inside):
                 chosen.append(factor)
                 inside = zeros.within(inside, factor)
         for factor in list(chosen):
-            others = [one for one in chosen if one is not factor]
+            others = [other for other in chosen if other is not factor]
             if others and zeros.vanishes(factor, zeros.within(zeros.everywhere, *others)):
                 chosen = others
         if set(chosen) != set(family):
@@ -263,21 +265,21 @@ class Cases:
 
     def _drop_parts(self) -> None:
         """Drop families whose set is part of another's."""
-        kept: list[list[Product]] = []
+        remaining: list[list[Product]] = []
         for family in sorted(self.families, key=len):
             basis = self._zeros.within(self._zeros.everywhere, *family)
-            for other in kept:
+            for other in remaining:
                 if all(self._zeros.vanishes(factor, basis) for factor in other):
                     if set(family) != set(other):
                         self._step("part_of", family=self._shown(family), whole=self._shown(other))
                     break
             else:
-                kept.append(family)
-        self.families = kept
+                remaining.append(family)
+        self.families = remaining
 
     def _shown(self, factors: list[Product]) -> list[Formula]:
         return [condition(factor, self._names) for factor in factors]
 
-    def _step(self, code: str, given: Sequence[Product] = (), **values: Any) -> None:
-        case = {"given": self._shown(list(given))} if given else {}
+    def _step(self, code: str, vanishing: Sequence[Product] = (), **values: Any) -> None:
+        case = {"given": self._shown(list(vanishing))} if vanishing else {}
         self.steps.append(Finding(code, case | values))

@@ -25,7 +25,7 @@ MANY_REASONS = 12
 
 
 class Conclusion(NamedTuple):
-    """What follows from formulas: what, remarks below it, its proof, a hint; and words before it."""
+    """What follows from formulas: a finding, remarks below it, its proof, a hint; and words before it."""
 
     finding: Finding
     below: tuple[Finding, ...] = ()
@@ -34,32 +34,32 @@ class Conclusion(NamedTuple):
     before: str = ""
 
     def text(self) -> Typeset:
-        said = str(self.finding) if self.before else capitalised(str(self.finding))
+        statement = str(self.finding) if self.before else capitalised(str(self.finding))
         announces = self.finding.code == "minors_vanishing" and self.below
-        return sentence(self.before, said, ":" if announces else ".")
+        return sentence(self.before, statement, ":" if announces else ".")
 
     def reasons(self) -> list[Typeset]:
         return [sentence("" if i else "because: ", str(step)) for i, step in enumerate(self.steps)]
 
 
-def show_formulas(given: Studied, analysis: SymbolicAnalysis, chosen: Sequence[Columns] | None) -> None:
+def show_formulas(studied: Studied, analysis: SymbolicAnalysis, chosen: Sequence[Columns] | None) -> None:
     from nmm.plugins.symbolic.symbolic_analysis import text_lines
 
     shown = only(analysis, chosen)
     body = list(text_lines(shown))
-    for line in (*header(given), *_geometry(analysis, "\n".join(body))):
+    for line in (*header(studied), *_geometry(analysis, "\n".join(body))):
         say(line)
     short = _short_forms("\n".join(body), analysis)
-    one, several = [name for name in short if len(name) == 2], [name for name in short if len(name) > 2]
+    single, several = [name for name in short if len(name) == 2], [name for name in short if len(name) > 2]
     several.sort(key=lambda name: (len(name), name[0] != "s", name))
-    examples = [f"{name} is {short[name]}" for name in (*one[:1], *several[:1])]
+    examples = [f"{name} is {short[name]}" for name in (*single[:1], *several[:1])]
     if examples:
         say(", ".join(examples))
     say()
     for text in body:
         say(text)
     say("what follows")
-    for conclusion in conclusions(given, analysis):
+    for conclusion in conclusions(studied, analysis):
         say(f"  {conclusion.text()}")
         for remark in conclusion.below:
             say(f"    {remark}")
@@ -71,32 +71,32 @@ def show_formulas(given: Studied, analysis: SymbolicAnalysis, chosen: Sequence[C
         say(f"note: {note}")
 
 
-def show_latex(given: Studied, analysis: SymbolicAnalysis, chosen: Sequence[Columns] | None) -> None:
-    """Print all that, as the body of a document and nothing else."""
-    print("\n".join(_body(given, analysis, only(analysis, chosen))))
+def show_latex(studied: Studied, analysis: SymbolicAnalysis, chosen: Sequence[Columns] | None) -> None:
+    """Print the same as the body of a LaTeX document, and nothing else."""
+    print("\n".join(_body(studied, analysis, only(analysis, chosen))))
 
 
-def _body(given: Studied, analysis: SymbolicAnalysis, shown: SymbolicAnalysis) -> Iterator[str]:
-    """The lines; `shown` has the chosen minors alone, what follows is of all."""
+def _body(studied: Studied, analysis: SymbolicAnalysis, shown: SymbolicAnalysis) -> Iterator[str]:
+    """The lines of that body: formulas with the minors of `shown` alone, conclusions from all minors."""
     from nmm import __version__
     from nmm.plugins.symbolic.symbolic_analysis import text_lines, zeros_summed
 
-    body, follows = shown.latex(), conclusions(given, analysis)
+    body, follows = shown.latex(), conclusions(studied, analysis)
     items = list(_items(follows))
     yield f"% nmm {__version__}; needs \\usepackage{{amsmath}}"
-    who, *what = header(given)
+    who, *what = header(studied)
     yield f"{sentence(who).latex}."
     for line in (*what, *_geometry(analysis, "\n".join(text_lines(shown)))):
         yield f"{capitalised(line).latex}."  # type: ignore[attr-defined]  # typeset as they were
     values = (Formula(f"f{i}", f"f_{{{i}}}") for i in range(1, len(analysis.row_names) + 1))
-    pairs = zip(values, row_names(given), strict=True)
+    pairs = zip(values, row_names(studied), strict=True)
     rows = joined((sentence(value, " (", name, ")") for value, name in pairs), last=" and ")
     yield f"The task's value has the rows {rows.latex}; the columns of $J$ are named after the inputs."
     if analysis.derivation.target_moves:
         yield "The target $g$ depends on $q$, too."
     yield r"$\Delta$ with the names of columns is their minor."
-    said = (line for one in follows for line in (one.text(), *map(str, one.below), *one.reasons()))
-    short = _short_forms("\n".join([*text_lines(shown), *said]), analysis)
+    lines = (line for item in follows for line in (item.text(), *map(str, item.below), *item.reasons()))
+    short = _short_forms("\n".join([*text_lines(shown), *lines]), analysis)
     if short:
         names = (Formula(name, f"{name[0]}_{{{name[1:]}}}") for name in short)
         meant = joined(formula(name, " = ", of) for name, of in zip(names, short.values(), strict=True))
@@ -111,13 +111,13 @@ def _body(given: Studied, analysis: SymbolicAnalysis, shown: SymbolicAnalysis) -
 
 
 def _items(follows: Sequence[Conclusion]) -> Iterator[str]:
-    """Conclusions as items, with their reasons as items below; what is about the command as comments."""
+    """Conclusions as items, with their reasons as nested items, and hints about the command as comments."""
     yield r"\begin{itemize}"
-    for one in follows:
-        yield rf"\item {one.text().latex}"
-        if one.hint:
-            yield f"% {one.hint}"
-        below = [*(sentence(str(remark)) for remark in one.below), *one.reasons()]
+    for conclusion in follows:
+        yield rf"\item {conclusion.text().latex}"
+        if conclusion.hint:
+            yield f"% {conclusion.hint}"
+        below = [*(sentence(str(remark)) for remark in conclusion.below), *conclusion.reasons()]
         if below:
             yield r"  \begin{itemize}"
             yield from (rf"  \item {line.latex}" for line in below)
@@ -136,8 +136,8 @@ def only(analysis: SymbolicAnalysis, chosen: Sequence[Columns] | None) -> Symbol
 
 
 def _short_forms(body: str, analysis: SymbolicAnalysis) -> dict[str, Formula]:
-    """What each cosine and sine stands for that is written short: s12 is sin(q1 + q2)."""
-    found = sorted(
+    """The meaning of each cosine and sine in short form: s12 is sin(q1 + q2)."""
+    names = sorted(
         set(re.findall(r"\b[cs]\d+\b", body)) - set(analysis.symbols),
         key=lambda name: (len(name), name[1:], name[0]),
     )
@@ -148,7 +148,7 @@ def _short_forms(body: str, analysis: SymbolicAnalysis) -> dict[str, Formula]:
         total = formula(angles[0], *(part for angle in angles[1:] for part in (" + ", angle)))
         return formula(kinds[name[0]], "(", total, ")")
 
-    return {name: meaning(name) for name in found}
+    return {name: meaning(name) for name in names}
 
 
 def _geometry(analysis: SymbolicAnalysis, body: str) -> Iterator[Typeset]:
@@ -181,19 +181,19 @@ def _zero(analysis: SymbolicAnalysis) -> list[str]:
     return [name for name, value in numeric_arguments(analysis.robot).items() if value == 0.0]
 
 
-def conclusions(given: Studied, analysis: SymbolicAnalysis) -> list[Conclusion]:
-    found = [*_of_rank(given, analysis), *_of_minors(analysis)]
-    return sorted(found, key=lambda one: one.finding.code != "rank_undecided")
+def conclusions(studied: Studied, analysis: SymbolicAnalysis) -> list[Conclusion]:
+    results = [*_of_rank(studied, analysis), *_of_minors(analysis)]
+    return sorted(results, key=lambda conclusion: conclusion.finding.code != "rank_undecided")
 
 
-def _of_rank(given: Studied, analysis: SymbolicAnalysis) -> Iterator[Conclusion]:
+def _of_rank(studied: Studied, analysis: SymbolicAnalysis) -> Iterator[Conclusion]:
     from nmm.plugins.symbolic import lower_bound, singular_set
 
     bound = lower_bound(analysis)
     if bound is None:
         yield _conclusion(singular_set(analysis))
     else:
-        symbols = {str(one) for one in bound.conditions[0].free_symbols}
+        symbols = {str(symbol) for symbol in bound.conditions[0].free_symbols}
         lengths = [name for name in analysis.geometry if name in symbols]
         values: dict[str, Any] = {"rank": len(analysis.row_names), "bound": bound.statement.values["bound"]}
         if lengths:
@@ -203,13 +203,13 @@ def _of_rank(given: Studied, analysis: SymbolicAnalysis) -> Iterator[Conclusion]
         yield Conclusion(Finding("rank_bounded", values), steps=bound.steps)
     used = {str(symbol) for minor in analysis.minors.values() for symbol in minor.free_symbols}
     lengths = [name for name in analysis.geometry if name in used]
-    first = next((name for name in lengths if name in given.robot.arguments), None)
-    if first and given.robot.platform.p and not _zero(analysis) and _may_be_zero(given.robot, first):
+    first = next((name for name in lengths if name in studied.robot.arguments), None)
+    if first and studied.robot.platform.p and not _zero(analysis) and _may_be_zero(studied.robot, first):
         try:
             without = singular_set(analysis, (first,))
         except InputError:  # J is divided by it
             return
-        key = first if given.scenario is None else f"robot.arguments.{first}"
+        key = first if studied.scenario is None else f"robot.arguments.{first}"
         hint = Finding("formulas_without", {"key": key}) if without.proved else None
         before = sentence("With ", formula(symbol(first), " = ", 0), " instead: ") if without.proved else ""
         yield _conclusion(without, hint, before)
@@ -217,7 +217,7 @@ def _of_rank(given: Studied, analysis: SymbolicAnalysis) -> Iterator[Conclusion]
 
 def _conclusion(claim: Claim, hint: Finding | None = None, before: str = "") -> Conclusion:
     angles = [_angle(condition) for condition in claim.conditions]
-    values = [one for one in angles if one is not None]
+    values = [angle for angle in angles if angle is not None]
     means = (Finding("zero_angles", {"values": values}),) if values and len(values) == len(angles) else ()
     return Conclusion(claim.statement, means, claim.steps, hint, before)
 

@@ -107,19 +107,19 @@ class Derivation:
             matrix=tuple(less(row) for row in self.matrix),
             row_denominators=rows,
             column_denominators=columns,
-            auxiliaries=tuple(one._replace(arguments=less(one.arguments)) for one in self.auxiliaries),
+            auxiliaries=tuple(aux._replace(arguments=less(aux.arguments)) for aux in self.auxiliaries),
             lengths={name: value for name, value in self.lengths.items() if name not in names},
             zero=(*self.zero, *names),
         )
 
 
 def derived(robot: Robot, stack: Stack, geometry: Geometry) -> Derivation:
-    """The rows of f, and (∂f/∂q - ∂g/∂q) S."""
+    """Derive the rows of f, and (∂f/∂q - ∂g/∂q) S."""
     frames = Frames(robot, geometry)
     frames.coordinates()
     rows = task_rows(stack, frames)
     G, columns = platform_columns(frames)
-    one = geometry.ring.number(1)
+    unit = geometry.ring.number(1)
     below = [_denominator(row, frames) for row in rows]
     notes = list(geometry.notes)
     for joint in robot.mimic_joints:
@@ -130,7 +130,7 @@ def derived(robot: Robot, stack: Stack, geometry: Geometry) -> Derivation:
         values=tuple(row.value for row in rows),
         matrix=tuple(_times_S(numerators, G, frames) for numerators, _ in below),
         row_denominators=tuple(denominator for _, denominator in below),
-        column_denominators=(*columns, *[one] * len(robot.arm_coordinates)),
+        column_denominators=(*columns, *[unit] * len(robot.arm_coordinates)),
         auxiliaries=tuple(frames.auxiliaries),
         lengths=geometry.values,
         target_moves=any(row.target_moves for row in rows),
@@ -153,9 +153,9 @@ def _times_S(row: Sequence[Expansion], G: list[list[Expansion]], frames: Frames)
     """A row times S = blkdiag(G, C)."""
     robot, ring = frames.robot, frames.geometry.ring
     platform, gradient = robot.platform, list(row)
-    for one in robot.mimic_joints:
-        leader, follower = robot.coordinate(one.leader), robot.coordinate(one.joint)
-        gradient[leader] = gradient[leader] + gradient[follower].scaled(exact(one.multiplier))
+    for mimic in robot.mimic_joints:
+        leader, follower = robot.coordinate(mimic.leader), robot.coordinate(mimic.joint)
+        gradient[leader] = gradient[leader] + gradient[follower].scaled(exact(mimic.multiplier))
     products = [
         [gradient[i] * G[i][j] for i in range(platform.n_p) if G[i][j] and gradient[i]]
         for j in range(platform.p)

@@ -125,9 +125,9 @@ class Expansion:
     def __mul__(self, other: Expansion) -> Expansion:
         self.ring.spend(len(self.terms) * len(other.terms))
         products = (
-            (_times(one, two), (a * c - b * d if b and d else a * c, a * d + b * c))
-            for one, (a, b) in self.terms.items()
-            for two, (c, d) in other.terms.items()
+            (_times(left, right), (a * c - b * d if b and d else a * c, a * d + b * c))
+            for left, (a, b) in self.terms.items()
+            for right, (c, d) in other.terms.items()
         )
         return collected(self.ring, products)
 
@@ -173,11 +173,11 @@ class Expansion:
         variables = sorted(self.variables())
         context = flint.fmpq_mpoly_ctx.get([f"x{i}" for i in variables], "lex")
         shifts, parts = [], []
-        for one in (self, other):
-            powers = [[dict(key).get(i, 0) for i in variables] for key in one.terms]
+        for operand in (self, other):
+            powers = [[dict(key).get(i, 0) for i in variables] for key in operand.terms]
             shifts.append([min(column) for column in zip(*powers, strict=True)])
             keys = [tuple(map(operator.sub, key, shifts[-1])) for key in powers]
-            for numbers in zip(*one.terms.values(), strict=True):
+            for numbers in zip(*operand.terms.values(), strict=True):
                 parts.append(context.from_dict(dict(zip(keys, map(rational, numbers), strict=True))))
         a, b, c, d = parts
         norm = c * c + d * d  # of c + d i, by which a + b i is divided
@@ -204,24 +204,24 @@ class Expansion:
         return {i for key in self.terms for i, _ in key}
 
     def without(self, variables: set[int]) -> Expansion:
-        """The terms in which none of the variables occurs: with scalars set to 0, or averaged over angles."""
-        kept = {k: v for k, v in self.terms.items() if not any(i in variables for i, _ in k)}
-        return Expansion(self.ring, kept)
+        """The terms without these variables: the value where scalars are 0, or its mean over angles."""
+        terms = {k: v for k, v in self.terms.items() if not any(i in variables for i, _ in k)}
+        return Expansion(self.ring, terms)
 
 
 def collected(ring: Ring, terms: Iterable[tuple[Key, Gaussian]]) -> Expansion:
-    found: dict[Key, Gaussian] = {}
+    sums: dict[Key, Gaussian] = {}
     for key, (re, im) in terms:
-        old = found.get(key)
-        found[key] = (re, im) if old is None else (old[0] + re, old[1] + im)
-    return Expansion(ring, {key: number for key, number in found.items() if number[0] or number[1]})
+        old = sums.get(key)
+        sums[key] = (re, im) if old is None else (old[0] + re, old[1] + im)
+    return Expansion(ring, {key: number for key, number in sums.items() if number[0] or number[1]})
 
 
-def _times(one: Key, two: Key) -> Key:
-    if not one or not two:
-        return one or two
-    powers = dict(one)
-    for i, n in two:
+def _times(left: Key, right: Key) -> Key:
+    if not left or not right:
+        return left or right
+    powers = dict(left)
+    for i, n in right:
         powers[i] = powers.get(i, 0) + n
     return tuple(sorted((i, n) for i, n in powers.items() if n))
 
@@ -241,11 +241,11 @@ def exact(value: float) -> Fraction:
 
 
 def maximal_minors(rows: list[list[Expansion]]) -> dict[tuple[int, ...], Expansion]:
-    """Minors of a matrix (s, m), s <= m, by columns: along the first row, each smaller one made once."""
+    """Minors of a matrix (s, m), s <= m, by columns: expanded along rows, each smaller one computed once."""
     ring = rows[0][0].ring
     below: dict[tuple[int, ...], Expansion] = {(): ring.number(1)}
     for size, row in enumerate(reversed(rows), 1):
-        found = {}
+        minors = {}
         for columns in itertools.combinations(range(len(row)), size):
             total = ring.number(0)
             for i, j in enumerate(columns):
@@ -253,6 +253,6 @@ def maximal_minors(rows: list[list[Expansion]]) -> dict[tuple[int, ...], Expansi
                 if row[j] and minor:
                     product = row[j] * minor
                     total = total - product if i % 2 else total + product
-            found[columns] = total
-        below = found
+            minors[columns] = total
+        below = minors
     return below

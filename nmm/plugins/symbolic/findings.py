@@ -13,7 +13,7 @@ _SEARCH = Typeset("--search", r"\texttt{-{}-search}")
 
 def _each(factors: Iterable[Any], sign: str = " = ", mark: str = " and ") -> Typeset:
     """ "d = 0 and c1 = 0"."""
-    return joined((formula(one, sign, 0) for one in factors), mark)
+    return joined((formula(factor, sign, 0) for factor in factors), mark)
 
 
 def _minors(minors: Iterable[Sequence[str]], last: str = ", ") -> Typeset:
@@ -87,8 +87,8 @@ def _nullstellensatz(divided: Sequence[Any] = ()) -> Typeset:
     return sentence(1, " is a combination of the minors and ", squares, by, " (Nullstellensatz)")
 
 
-def _case(given: Sequence[Any], *said: object) -> Typeset:
-    return sentence(*(("where ", _each(given, mark=", "), ": ") if given else ()), *said)
+def _case(conditions: Sequence[Any], *statement: object) -> Typeset:
+    return sentence(*(("where ", _each(conditions, mark=", "), ": ") if conditions else ()), *statement)
 
 
 def _split(

@@ -67,10 +67,10 @@ class Lazy:
         self.shape = shape
 
     def __getitem__(self, index: int | tuple[int, ...]) -> Any:
-        found = index if isinstance(index, tuple) else (index,)
-        if len(found) == len(self.shape):
-            return self._entry(*found)
-        return Lazy(partial(self._entry, *found), self.shape[len(found) :])
+        indices = index if isinstance(index, tuple) else (index,)
+        if len(indices) == len(self.shape):
+            return self._entry(*indices)
+        return Lazy(partial(self._entry, *indices), self.shape[len(indices) :])
 
 
 def lazy(entry: Callable[..., Any], *shape: int) -> Any:
@@ -131,9 +131,9 @@ class Frames:
         return [turned(forward, twist[3:], ring) for twist in self.twists(steps)]
 
     def twists(self, steps: list[Step]) -> list[Vector]:
-        """v over ω of the last frame per coordinate, in its own axes."""
-        found, rest = twists(steps, self.geometry), [self.geometry.ring.number(0)] * 6
-        return [found.get(name, rest) for name in self.robot.q_names]
+        """The last frame's twist, v over ω, per coordinate, in its own axes."""
+        by_joint, rest = twists(steps, self.geometry), [self.geometry.ring.number(0)] * 6
+        return [by_joint.get(name, rest) for name in self.robot.q_names]
 
     def gradient(self, value: Expansion) -> list[Expansion]:
         return [value.derivative(index) for index in self._indices()]
@@ -148,13 +148,13 @@ class Frames:
         return self._made[key]
 
     def auxiliary(self, *wanted: tuple[str, str, Sequence[Expansion]]) -> list[str]:
-        """Names of symbols for quantities, each given as (preferred name, kind, arguments); if one of the
-        names is taken, all get the same number."""
+        """Names of symbols for quantities (preferred name, kind, arguments); if a name is taken, all get the
+        same number."""
         size, quantities = len(wanted), [(kind, tuple(arguments)) for _, kind, arguments in wanted]
         for i in range(len(self.auxiliaries) - size + 1):
             group = self.auxiliaries[i : i + size]
-            if [one[1:] for one in group] == quantities:
-                return [one.name for one in group]
+            if [auxiliary[1:] for auxiliary in group] == quantities:
+                return [auxiliary.name for auxiliary in group]
         taken = {*self.robot.q_names, *self.geometry.ring.names}
         endings = itertools.chain([""], itertools.count(2))
         tried = ([f"{name}{ending}" for name, _, _ in wanted] for ending in endings)
@@ -166,7 +166,7 @@ class Frames:
     def positive(self) -> set[int]:
         """Indices of auxiliary lengths, which are never negative."""
         ring = self.geometry.ring
-        kinds = {one.name: one.kind for one in self.auxiliaries}
+        kinds = {auxiliary.name: auxiliary.kind for auxiliary in self.auxiliaries}
         return {i for i, name in enumerate(ring.names) if kinds.get(name) in ("length", "root", "ahead")}
 
     def angle(self, sine: Expansion, cosine: Expansion) -> Linear | None:
@@ -256,22 +256,22 @@ def turns(steps: list[Step], geometry: Geometry) -> tuple[Turning, ...]:
 
 
 def twists(steps: list[Step], geometry: Geometry) -> dict[str, list[Expansion]]:
-    """v over ω of the last frame, in its own axes, for each joint on the way by name: v = Rᵀ (a × p) and
-    ω = Rᵀ a where it turns about a."""
+    """The last frame's twist, v over ω, in its own axes, by the name of each joint on the way: v = Rᵀ (a × p)
+    and ω = Rᵀ a where it turns about a."""
     ring = geometry.ring
     _name_lengths(steps, geometry)
     behind: list[Turning] = []
     zero = [ring.number(0)] * 3
-    p, found = zero, {}
+    p, by_joint = zero, {}
     for step in reversed(steps):
         if step.kind != "fixed":
             axis = [-entry if step.backward else entry for entry in _axis(step, geometry)]
             home = back(merged(behind))
             v, w = (cross(axis, p), axis) if step.kind == "revolute" else (axis, zero)
-            found[step.label] = turned(home, v, ring) + turned(home, w, ring)
+            by_joint[step.label] = turned(home, v, ring) + turned(home, w, ring)
         p = carried(step, p, geometry)
         behind = [*_turns_of(step, geometry), *behind]
-    return found
+    return by_joint
 
 
 def _name_lengths(steps: list[Step], geometry: Geometry) -> None:
@@ -297,16 +297,16 @@ def _turns_of(step: Step, geometry: Geometry) -> list[Turning]:
     if step.kind == "prismatic":
         return []
     if step.kind == "fixed":
-        found = geometry.rotation(step.rotation, step.label)
+        turns = geometry.rotation(step.rotation, step.label)
     else:
         angle = geometry.ring.variable(step.label, True)
         straight = signed_axis(step.axis)
         if straight is not None:
-            found = [Turning(straight[0], ((angle, straight[1]),))]
+            turns = [Turning(straight[0], ((angle, straight[1]),))]
         else:
             tilt = geometry.towards(step.axis, step.label)
-            found = [*tilt, Turning(2, ((angle, 1),)), *back(tilt)]
-    return back(found) if step.backward else found
+            turns = [*tilt, Turning(2, ((angle, 1),)), *back(tilt)]
+    return back(turns) if step.backward else turns
 
 
 def _axis(step: Step, geometry: Geometry) -> Vector:

@@ -81,11 +81,11 @@ def _check_branches(analysis: SymbolicAnalysis, stack: Stack) -> None:
 
 def numeric_arguments(robot: Robot) -> dict[str, float]:
     """The xacro arguments that are numbers."""
-    found = {}
+    numbers = {}
     for name, text in robot.arguments.items():
         with suppress(ValueError):
-            found[name] = float(text)
-    return found
+            numbers[name] = float(text)
+    return numbers
 
 
 def argument_names(robot: Robot, frames: Iterable[str]) -> dict[str, str]:
@@ -94,10 +94,10 @@ def argument_names(robot: Robot, frames: Iterable[str]) -> dict[str, str]:
     lengths, and those of a robot that was not read from one xacro file, keep their labels."""
     from nmm.model.robots.loading import load
 
-    given = numeric_arguments(robot)
-    if not any(given.values()):
+    numbers = numeric_arguments(robot)
+    if not any(numbers.values()):
         return {}
-    changed = {name: value * (1.0 + 0.001 * (1 + i)) for i, (name, value) in enumerate(given.items())}
+    changed = {name: value * (1.0 + 0.001 * (1 + i)) for i, (name, value) in enumerate(numbers.items())}
     arguments = {**robot.arguments, **{name: repr(value) for name, value in changed.items()}}
     wheels = [wheel.joint for wheel in robot.wheels]
     try:
@@ -111,12 +111,12 @@ def argument_names(robot: Robot, frames: Iterable[str]) -> dict[str, str]:
         return {}
     if any(label != same for (label, _), (same, _) in pairs):
         return {}
-    signed = [(name, sign) for name in given for sign in (1, -1)]
+    signed = [(name, sign) for name in numbers for sign in (1, -1)]
     return {
         label: name if sign > 0 else f"-{name}"
         for (label, value), (_, after) in pairs
         for name, sign in signed
-        if value and abs(value - sign * given[name]) < 1e-9 and abs(after - sign * changed[name]) < 1e-9
+        if value and abs(value - sign * numbers[name]) < 1e-9 and abs(after - sign * changed[name]) < 1e-9
     }
 
 

@@ -48,19 +48,19 @@ def back(turns: Sequence[Turning]) -> list[Turning]:
 
 
 def merged(turns: Sequence[Turning]) -> tuple[Turning, ...]:
-    """Neighbours about one axis joined, those without effect dropped."""
-    found: list[Turning] = []
+    """Join neighbouring turns about one axis; drop those without effect."""
+    joined: list[Turning] = []
     for turn in turns:
-        if found and found[-1].axis == turn.axis:
-            before = found.pop()
+        if joined and joined[-1].axis == turn.axis:
+            before = joined.pop()
             angle = dict(before.angle)
             for i, k in turn.angle:
                 angle[i] = angle.get(i, 0) + k
-            kept = tuple((i, k) for i, k in angle.items() if k)
-            turn = Turning(turn.axis, kept, (before.quarters + turn.quarters) % 4)
+            nonzero = tuple((i, k) for i, k in angle.items() if k)
+            turn = Turning(turn.axis, nonzero, (before.quarters + turn.quarters) % 4)
         if turn.angle or turn.quarters:
-            found.append(turn)
-    return tuple(found)
+            joined.append(turn)
+    return tuple(joined)
 
 
 def unit_vectors(ring: Ring) -> list[Vector]:
@@ -111,9 +111,9 @@ class Geometry:
             return self.ring.number(0)
         if self._as_numbers:
             return self.ring.number(exact(value))
-        given = self._arguments.get(label, label)
-        sign = -1 if given.startswith("-") else 1
-        index = self._variable(label, given.removeprefix("-"), sign * value, False)
+        argument = self._arguments.get(label, label)
+        sign = -1 if argument.startswith("-") else 1
+        index = self._variable(label, argument.removeprefix("-"), sign * value, False)
         return self.ring.scalar(self.ring.names[index]).scaled(Fraction(sign))
 
     def fixed_angle(self, value: float) -> int:

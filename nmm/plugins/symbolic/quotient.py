@@ -166,9 +166,9 @@ def _plus(a: Any, b: Any, sign: int = 1) -> Any:
         if isinstance(value, Linear | Real)
     ]
     if len(linear) == 2:
-        one, two = linear
-        terms = one.terms | {i: one.terms.get(i, Fraction(0)) + sign * n for i, n in two.terms.items()}
-        return Linear(ring, terms, one.constant + sign * two.constant)
+        left, right = linear
+        terms = left.terms | {i: left.terms.get(i, Fraction(0)) + sign * n for i, n in right.terms.items()}
+        return Linear(ring, terms, left.constant + sign * right.constant)
     return quotient(a, ring).plus(_times(quotient(b, ring), sign))
 
 

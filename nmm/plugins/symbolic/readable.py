@@ -44,18 +44,18 @@ def factored(value: Expansion) -> Product:
 
 
 def expanded(product: Product, ring: Ring) -> Expansion:
-    """The polynomial behind a product without named factors."""
+    """Multiply out a product without named factors."""
     total = ring.number(product.number)
     for factor, power in product.factors:
         if isinstance(factor, Symbol):
             total = total * ring.scalar(factor.name, power)
             continue
         if isinstance(factor, Sum):
-            one = sum((expanded(term, ring) for term in factor.terms), ring.number(0))
+            value = sum((expanded(term, ring) for term in factor.terms), ring.number(0))
         else:
             angle = {ring.variable(name, True): n for name, n in factor.angle}
-            one = ring.cos(angle) if factor.kind == "cos" else ring.sin(angle)
-        total = total * one.power(power)
+            value = ring.cos(angle) if factor.kind == "cos" else ring.sin(angle)
+        total = total * value.power(power)
     return total
 
 
@@ -130,14 +130,14 @@ def _written(terms: list[Product]) -> Product:
 
 def _split(value: Expansion) -> list[Product] | None:
     """C cos φ + S sin φ + R for the angle that leaves the fewest waves; None where none leaves fewer."""
-    found: list[tuple[int, int, tuple[Expansion, Expansion, Expansion]]] = []
+    candidates: list[tuple[int, int, tuple[Expansion, Expansion, Expansion]]] = []
     for angle in value.variables():
         if value.ring.is_angle[angle] and all(abs(dict(key).get(angle, 0)) <= 1 for key in value.terms):
             parts = _harmonics(value, angle)
-            found.append((sum(len(part.terms) for part in parts), angle, parts))
-    if not found:
+            candidates.append((sum(len(part.terms) for part in parts), angle, parts))
+    if not candidates:
         return None
-    left, angle, (cosine, sine, rest) = min(found, key=lambda one: one[:2])
+    left, angle, (cosine, sine, rest) = min(candidates, key=lambda candidate: candidate[:2])
     if left >= len(value.terms):
         return None
     name = ((value.ring.names[angle], 1),)

@@ -99,7 +99,7 @@ class SymbolicAnalysis:
     @property
     def definitions(self) -> dict[str, Any]:
         """Definitions of auxiliary symbols, by name."""
-        return {name: one.expression for name, one in self.auxiliaries.items()}
+        return {name: auxiliary.expression for name, auxiliary in self.auxiliaries.items()}
 
     @cached_property
     def short_entries(self) -> tuple[tuple[Product, ...], ...]:
@@ -199,7 +199,7 @@ def assembled(robot: Robot, row_names: tuple[str, ...], derivation: Derivation) 
         minor_forms=minors,
         named_forms=names,
         short_forms=dict(zip(minors, short, strict=True)),
-        auxiliaries={one.name: auxiliary_written(one, symbols) for one in derivation.auxiliaries},
+        auxiliaries={aux.name: auxiliary_written(aux, symbols) for aux in derivation.auxiliaries},
         numerators={key: numbers[picked] for key, picked in keys.items()},
         derivation=derivation,
         notes=derivation.notes,
@@ -246,11 +246,11 @@ def zeros_summed(formulas: SymbolicAnalysis) -> int:
 
 def _definitions(formulas: SymbolicAnalysis) -> list[tuple[Formula, Formula]]:
     """Auxiliary symbols, matrices of rotation vectors, named factors."""
-    turns = [one for one in formulas.derivation.values if isinstance(one, Turn)]
-    found = {name: one.formula for name, one in formulas.auxiliaries.items()}
-    found |= {one.name: rotation_formula(one) for one in turns}
-    found |= {name: shown(form) for name, form in formulas.named_forms.items()}
-    return [(symbol(name), value) for name, value in found.items()]
+    turns = [value for value in formulas.derivation.values if isinstance(value, Turn)]
+    definitions = {name: auxiliary.formula for name, auxiliary in formulas.auxiliaries.items()}
+    definitions |= {turn.name: rotation_formula(turn) for turn in turns}
+    definitions |= {name: shown(form) for name, form in formulas.named_forms.items()}
+    return [(symbol(name), value) for name, value in definitions.items()]
 
 
 def latex_lines(formulas: SymbolicAnalysis) -> list[tuple[str, str]]:
@@ -272,16 +272,16 @@ class SymbolicFunctions:
         self._geometry, J, minors = dict(formulas.geometry), formulas.J, formulas.minors
         self._n, self._columns, self._shape = len(formulas.q), tuple(minors), J.shape
         rotations = {name: partial(_rotation_vector, part) for part, name in enumerate(ROTATION_VECTOR)}
-        given = [formulas.symbols[name] for name in (*formulas.q, *formulas.geometry)]
+        arguments = [formulas.symbols[name] for name in (*formulas.q, *formulas.geometry)]
         auxiliary = [formulas.symbols[name] for name in formulas.definitions]
 
         def compiled(entries: Iterable[Any], more: Sequence[Any] = ()) -> Any:
             entries = [sympy.sympify(entry) for entry in entries]
-            return sympy.lambdify([*given, *more], entries, [rotations, "numpy"], cse=True)
+            return sympy.lambdify([*arguments, *more], entries, [rotations, "numpy"], cse=True)
 
         self._auxiliary = compiled(formulas.definitions.values())
         self._f, self._J, self._minors = (
-            compiled(one, auxiliary) for one in (formulas.f, J, minors.values())
+            compiled(expressions, auxiliary) for expressions in (formulas.f, J, minors.values())
         )
 
     def f(self, q: ArrayLike, **geometry: float) -> Array:
@@ -306,9 +306,9 @@ class SymbolicFunctions:
         for name, value in geometry.items():
             expect_known("length", name, values)
             values[name] = scalar(value, name)
-        given = [*np.moveaxis(q, -1, 0), *values.values()]
-        found = function(*given, *self._auxiliary(*given))
-        return np.stack([np.broadcast_to(entry, q.shape[:-1]) for entry in found], axis=-1).astype(np.float64)
+        arguments = [*np.moveaxis(q, -1, 0), *values.values()]
+        flat = function(*arguments, *self._auxiliary(*arguments))
+        return np.stack([np.broadcast_to(entry, q.shape[:-1]) for entry in flat], axis=-1).astype(np.float64)
 
 
 def _rotation_vector(part: int, *entries: ArrayLike) -> Array:

@@ -46,13 +46,13 @@ class TracedRow(NamedTuple):
 def frames_of(functions: Iterable[Function], robot: Robot) -> list[str]:
     """Names of the frames that functions read, the centre of mass not among them."""
     stages = [stage for function in functions for stage in function.stages(robot)]
-    found = dict.fromkeys(frame for stage in stages for frame in stage.frames)
-    return [frame for frame in found if frame != CENTER_OF_MASS]
+    frames = dict.fromkeys(frame for stage in stages for frame in stage.frames)
+    return [frame for frame in frames if frame != CENTER_OF_MASS]
 
 
 def task_rows(stack: Stack, frames: Frames) -> list[TracedRow]:
     """The rows of f, with the derivatives of f - g, from which J of eq. 13 is made."""
-    found = []
+    rows = []
     for task in stack:
         task.rows(frames.robot)
         frames.undefined.clear()
@@ -81,8 +81,8 @@ def task_rows(stack: Stack, frames: Frames) -> list[TracedRow]:
                 for row, target in zip(gradients, targets, strict=True)
             ]
         defined = tuple(frames.undefined)
-        found += [TracedRow(*row, defined) for row in zip(values, gradients, moves, strict=True)]
-    return found
+        rows += [TracedRow(*row, defined) for row in zip(values, gradients, moves, strict=True)]
+    return rows
 
 
 def function_rows(
@@ -141,15 +141,15 @@ def _value(value: Any, frames: Frames) -> Value:
         return value
     if isinstance(value, Linear) and any(ring.is_angle[i] for i in value.terms):
         return value
-    found = quotient(value, ring)
-    if found.under.variables():
+    ratio = quotient(value, ring)
+    if ratio.under.variables():
         raise Untraceable("its value is a quotient")
     for angle, name in ring.ratios.items():  # kappa sin(alpha) is alpha
         kappa = ring.scalar(name)
-        rest = found.over.divided(kappa * ring.sin({angle: 1}))
+        rest = ratio.over.divided(kappa * ring.sin({angle: 1}))
         if rest is not None and kappa.variables().isdisjoint(rest.variables()):
             return Share(ring.names[angle], rest)
-    return found.over
+    return ratio.over
 
 
 def _frame_pose(stage: Stage, rows: Rows, frames: Frames) -> None:
@@ -270,10 +270,10 @@ def _seen(stage: Stage, read: Read, rows: Rows, frames: Frames) -> Read:
 
 
 def _polynomials(values: Any, frames: Frames) -> list[Expansion]:
-    found = [quotient(value, frames.geometry.ring) for value in values]
-    if any(value.under.variables() for value in found):
+    ratios = [quotient(value, frames.geometry.ring) for value in values]
+    if any(ratio.under.variables() for ratio in ratios):
         raise Untraceable("it is taken of quotients")
-    return [value.over for value in found]
+    return [ratio.over for ratio in ratios]
 
 
 #: Rewrite the point in a kernel's rows by its distance rho and angles from another, which keeps formulas

@@ -64,14 +64,14 @@ class _Module:
 
     def __getattr__(self, name: str) -> Any:
         """Everything else: `math` takes numbers alone, numpy asks the symbols."""
-        there = getattr(self._module, name)
-        if self._module is np or not callable(there):
-            return there
+        attribute = getattr(self._module, name)
+        if self._module is np or not callable(attribute):
+            return attribute
 
         def plain(*arguments: Any) -> Any:
             if any(isinstance(argument, Traced) for argument in arguments) and not name.startswith("is"):
                 raise Untraceable(f"it takes math.{name} of a formula")
-            return there(*arguments)
+            return attribute(*arguments)
 
         return plain
 
@@ -109,13 +109,13 @@ class _Module:
         return Quotient(root)
 
     def log(self, x: Any) -> Any:
-        """That of how far ahead a point is gets a name."""
+        """The logarithm; that of how far ahead a point is gets a name."""
         if not isinstance(x, Traced):
             return math.log(x)
         value = self._polynomial(x)
-        for one in self._frames.auxiliaries:
-            if one.kind == "ahead" and not value - x.ring.scalar(one.name):
-                (name,) = self._frames.auxiliary(("lambda", "log", one.arguments))
+        for auxiliary in self._frames.auxiliaries:
+            if auxiliary.kind == "ahead" and not value - x.ring.scalar(auxiliary.name):
+                (name,) = self._frames.auxiliary(("lambda", "log", auxiliary.arguments))
                 return Quotient(x.ring.scalar(name))
         raise Untraceable("it takes math.log of a formula")
 
@@ -126,9 +126,9 @@ class _Module:
         size, rest = square.split()
         ((key, (number, _)),) = size.terms.items()
         root, ring = square.ring.number(1), square.ring
-        for one in self._frames.auxiliaries:
-            if one.kind == "off axis" and rest.variables():
-                sine = ring.sin({ring.variable(one.name, True): 1})
+        for auxiliary in self._frames.auxiliaries:
+            if auxiliary.kind == "off axis" and rest.variables():
+                sine = ring.sin({ring.variable(auxiliary.name, True): 1})
                 if (divided := rest.divided(sine * sine)) is not None and not divided.variables():
                     number, rest, root = number * divided.terms[()][0], ring.number(1), sine
         if rest.variables() or number < 0 or not size.variables() <= self._frames.positive():
@@ -152,7 +152,7 @@ class _Module:
     arctan2 = atan2
 
     def _polynomial(self, value: Traced) -> Expansion:
-        found = value.quotient()
-        if found.under.variables():
+        ratio = value.quotient()
+        if ratio.under.variables():
             raise Untraceable("it takes a square root or atan2 of quotients")
-        return found.over
+        return ratio.over

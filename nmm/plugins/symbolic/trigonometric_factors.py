@@ -23,17 +23,17 @@ Form = tuple[Any, Integers]
 
 
 def factors_of(value: Expansion) -> tuple[Fraction, Key, list[tuple[Expansion, int]]]:
-    """A number, powers of scalars, and factors with their powers, whose product is the value."""
+    """Factorise into a number, powers of scalars, and factors with their powers."""
     common, rest = value.split()
     ((scalars, (size, _)),) = common.terms.items()
-    found = _polynomial_factors(rest) if rest.variables() else []
+    factors = _polynomial_factors(rest) if rest.variables() else []
     product = value.ring.number(1)
-    for factor, power in found:
+    for factor, power in factors:
         product = product * factor.power(power)
     number = _ratio(rest, product)
     if number is None:  # never seen; the value itself is always right
-        found, number = [(rest, 1)], Fraction(1)
-    return size * number, scalars, found
+        factors, number = [(rest, 1)], Fraction(1)
+    return size * number, scalars, factors
 
 
 def _ratio(value: Expansion, product: Expansion) -> Fraction | None:
@@ -95,7 +95,7 @@ class HalfAngles:
         self._homogeneous = flint.fmpq_mpoly_ctx.get(names + scalars, "lex")
 
     def polynomial(self, value: Expansion) -> Any:
-        count, gens, found = len(self.degrees), self.context.gens(), {}
+        count, gens, coefficients = len(self.degrees), self.context.gens(), {}
         x, lengths = gens[:count], gens[count:]
         for part in (0, 1):
             terms = {}
@@ -103,12 +103,12 @@ class HalfAngles:
                 up, down = map(operator.add, self.degrees, wave), map(operator.sub, self.degrees, wave)
                 terms[*up, *down, *(dict(key).get(i, 0) for i in self._scalars)] = rational(number[part])
             form = self._homogeneous.from_dict(terms)
-            form = form.compose(*(1 + one for one in x), *(1 - one for one in x), *lengths, ctx=self.context)
+            form = form.compose(*(1 + gen for gen in x), *(1 - gen for gen in x), *lengths, ctx=self.context)
             for key, number in form.to_dict().items():
                 n = int(sum(key[:count]))  # x^n is i^n t^n, and the sum is real
                 if n % 2 == part:
-                    found[key] = number * (1, -1, -1, 1)[n % 4]
-        return self.context.from_dict(found)
+                    coefficients[key] = number * (1, -1, -1, 1)[n % 4]
+        return self.context.from_dict(coefficients)
 
     def waves(self, polynomial: Any, degree: Integers) -> Expansion:
         """A form of even degree as a trigonometric polynomial: t^n is sin^n cos^(degree-n) of the half angle,
@@ -127,15 +127,15 @@ class HalfAngles:
             for exponents, number in form.to_dict().items():
                 table.setdefault(tuple(map(int, exponents)), [0, 0])[part] = number
         self.ring.spend(len(table))
-        over, found = Fraction(1, 2 ** sum(degree)), {}
+        over, coefficients = Fraction(1, 2 ** sum(degree)), {}
         for exponents, (a, b) in table.items():
             key = dict(zip(self._scalars, exponents[len(degree) :], strict=True))
             for n, d, row in zip(exponents, degree, self._basis, strict=False):
                 for i, k in zip(self._angles, row, strict=True):
                     key[i] = key.get(i, 0) + (n - d // 2) * k
             numbers = (fraction(a) * over, fraction(b) * over)
-            found[tuple(sorted((i, n) for i, n in key.items() if n))] = numbers
-        return Expansion(self.ring, found)
+            coefficients[tuple(sorted((i, n) for i, n in key.items() if n))] = numbers
+        return Expansion(self.ring, coefficients)
 
 
 def basis_of(waves: Sequence[Integers], n: int) -> tuple[list[Integers], list[Integers]]:
@@ -191,5 +191,5 @@ def _joined(forms: list[Form], half_angles: HalfAngles) -> list[Expansion]:
     return [factor for factor in even if factor.variables()]
 
 
-def _product(one: Form, two: Form) -> Form:
-    return one[0] * two[0], tuple(a + b for a, b in zip(one[1], two[1], strict=True))
+def _product(left: Form, right: Form) -> Form:
+    return left[0] * right[0], tuple(a + b for a, b in zip(left[1], right[1], strict=True))

@@ -91,7 +91,7 @@ def written(value: Value, symbols: Mapping[str, Any]) -> Written:
 def rotation_formula(turn: Turn) -> Formula:
     """A rotation as a product of turns: Rz(theta + q1) Ry(q2)."""
     turns = [_turn(axis, angle, quarters) for axis, angle, quarters in turn.product]
-    return Formula(" ".join(turns) or "1", " ".join(one.latex for one in turns) or "1")
+    return Formula(" ".join(turns) or "1", " ".join(part.latex for part in turns) or "1")
 
 
 def _turn(axis: int, angle: Sequence[tuple[str, int]], quarters: int) -> Formula:
@@ -166,10 +166,10 @@ def _linear(value: Linear, symbols: Mapping[str, Any]) -> Written:
     quarters, rest = value.quarters
     if rest:
         return _of(_sum([*terms, Product(value.constant)]), symbols)
-    found = _of(_sum(terms), symbols)
+    combination = _of(_sum(terms), symbols)
     if not quarters:
-        return found
+        return combination
     turn = {1: " + pi/2", 2: " + pi", -1: " - pi/2"}.get(quarters, f" {quarters:+d} pi/2")
     turn_latex = turn.replace("pi/2", r"\frac{\pi}{2}").replace("+ pi", r"+ \pi")
-    total = Formula(found.formula + turn, found.formula.latex + turn_latex)
-    return Written(found.expression + quarters * sympy.pi / 2, total)
+    total = Formula(combination.formula + turn, combination.formula.latex + turn_latex)
+    return Written(combination.expression + quarters * sympy.pi / 2, total)

@@ -54,15 +54,15 @@ class Basis:
 
     def with_more(self, generators: Iterable[Any], limits: Limits) -> Basis:
         """The basis of this ideal and more generators; `Undecided` beyond the limits."""
-        found, more = self, [self._stripped(one) for one in generators if one]
+        ideal, more = self, [self._stripped(generator) for generator in generators if generator]
         while more:
-            everything = flint.fmpz_mpoly_vec([*found.members, *more], self.context)
+            everything = flint.fmpz_mpoly_vec([*ideal.members, *more], self.context)
             basis, finished = everything.buchberger_naive(limits=limits)
             if not finished:
                 raise Undecided
-            found = Basis(self.context, basis.autoreduction(), self.nonzero)
-            more = [shorter for one in found.members if (shorter := self._stripped(one)) != one]
-        return found
+            ideal = Basis(self.context, basis.autoreduction(), self.nonzero)
+            more = [shorter for member in ideal.members if (shorter := self._stripped(member)) != member]
+        return ideal
 
     def _stripped(self, polynomial: Any) -> Any:
         """Without factors that are not 0."""
@@ -84,9 +84,9 @@ class Zeros:
         limits: Limits | None = None,
         zero: Sequence[Product] = (),
     ) -> None:
-        found = list(leaves(*products, *nonzero, *zero))
-        waves = dict.fromkeys(leaf.angle for leaf in found if isinstance(leaf, Trig))
-        scalars = dict.fromkeys(leaf.name for leaf in found if isinstance(leaf, Symbol))
+        all_leaves = list(leaves(*products, *nonzero, *zero))
+        waves = dict.fromkeys(leaf.angle for leaf in all_leaves if isinstance(leaf, Trig))
+        scalars = dict.fromkeys(leaf.name for leaf in all_leaves if isinstance(leaf, Symbol))
         self._seen = _in_few_angles(list(waves))
         count = max(map(len, self._seen.values()), default=0)
         variables = [f"{kind}{i}" for i in range(count) for kind in ("cos", "sin")]
@@ -179,12 +179,12 @@ def _in_few_angles(waves: list[Angle]) -> dict[Angle, tuple[int, ...]]:
         return {}
     B = sympy.Matrix(picked)
     right = B.T * (B * B.T).inv()  # k = m B has the solution m = k right, where it has one
-    found: dict[Angle, tuple[int, ...]] = {}
+    combinations: dict[Angle, tuple[int, ...]] = {}
     for wave, row in (single | rows).items():
         m = sympy.Matrix([row]) * right
         if m * B == sympy.Matrix([row]) and all(entry.is_integer for entry in m):
-            found[wave] = tuple(int(entry) for entry in m)
+            combinations[wave] = tuple(int(entry) for entry in m)
         elif wave in rows:
             _, seen = basis_of(list((single | rows).values()), len(names))
             return dict(zip(single | rows, seen, strict=True))
-    return found
+    return combinations
