@@ -71,11 +71,11 @@ def _bottom(search: Search, z: Array) -> Array:
         _, C, values = search.equations(point[np.newaxis], corank=1)
         return float(values[0, -1]), C[0, 0]
 
-    found = minimize(
+    lowest = minimize(
         sigma, z, jac=True, method="L-BFGS-B", bounds=Bounds(*search.bounds),
         options={"gtol": 1e-9, "ftol": 1e-14},
     ).x  # fmt: skip
-    both = np.array([z, found])
+    both = np.array([z, lowest])
     return np.asarray(both[np.argmin(search.sigma(both)[0])])
 
 
@@ -197,8 +197,8 @@ class Local:
     codimension: Integers
 
     def signature(self, i: int) -> tuple[int, int, tuple[bool, ...]]:
-        """Points of one family have the same one; the first are the largest families."""
-        return int(self.codimension[i]), int(self.rank[i]), tuple(bool(one) for one in self.free[i])
+        """A sorting key, the same at all points of a family; the largest families come first."""
+        return int(self.codimension[i]), int(self.rank[i]), tuple(bool(flag) for flag in self.free[i])
 
 
 def localised(search: Search, z: Array) -> Local:
@@ -280,7 +280,7 @@ def walk(search: Search, z: Array, rank: int, along: Array) -> Array:
     """
     normals = normal_spaces(search, z[np.newaxis], search.measure.full_rank - rank)[0]
     complete = len(normals) == len(z) - len(along)  # else slopes do not tell the tangents; only z has them
-    found = [z[np.newaxis]]
+    points = [z[np.newaxis]]
     walkers, directions = np.tile(z, (WALKERS, 1)), [along] * WALKERS
     for _ in range(ROUNDS):
         mixes = search.rng.standard_normal((len(walkers), len(along)))
@@ -300,8 +300,8 @@ def walk(search: Search, z: Array, rank: int, along: Array) -> Array:
             directions = [null_space(own, len(own)) for own, ok in zip(spaces, same, strict=True) if ok]
         if not len(walkers):
             break
-        found.append(walkers)
-    return np.concatenate(found)
+        points.append(walkers)
+    return np.concatenate(points)
 
 
 def _same_piece(normals: Array, along: Array, count: int) -> bool:

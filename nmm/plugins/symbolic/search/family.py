@@ -112,13 +112,15 @@ class SingularFamily:
     def pinned(self) -> dict[str, tuple[float, ...]]:
         """Isolated values, any of them, by coordinate, rad or m; every combination is singular."""
         return {
-            next(iter(one.coefficients)): one.values for one in self.constraints if len(one.coefficients) == 1
+            next(iter(constraint.coefficients)): constraint.values
+            for constraint in self.constraints
+            if len(constraint.coefficients) == 1
         }
 
     @property
     def relations(self) -> tuple[Relation, ...]:
         """Sums of coordinates that are pinned."""
-        return tuple(one for one in self.constraints if len(one.coefficients) > 1)
+        return tuple(constraint for constraint in self.constraints if len(constraint.coefficients) > 1)
 
     @property
     def codimension(self) -> int:
@@ -133,7 +135,7 @@ class SingularFamily:
     @property
     def conditions(self) -> str:
         """ "q2 = 0 or ±π; q3, q4 and q5 tied by an equation"."""
-        texts = [one.text for one in self.constraints]
+        texts = [constraint.text for constraint in self.constraints]
         if self.equations > 0:
             count = "an equation" if self.equations == 1 else f"{self.equations} equations"
             texts.append(f"{listed(self.related)} tied by {count}")
@@ -156,7 +158,7 @@ class SingularFamily:
     def contains(self, q: Array) -> bool:
         """Whether q (n,) satisfies `constraints`; the equations of what is tied are not looked at."""
         values = dict(zip(self.names, q, strict=True))
-        return all(one.holds(values) for one in self.constraints)
+        return all(constraint.holds(values) for constraint in self.constraints)
 
     @property
     def kind(self) -> object:
@@ -169,48 +171,48 @@ class SingularFamily:
         return self.kind == other.kind and not _different(self, other)
 
 
-def _different(one: SingularFamily, other: SingularFamily) -> list[int]:
+def _different(family: SingularFamily, other: SingularFamily) -> list[int]:
     """Which constraints of two families of one kind have different values."""
-    pairs = enumerate(zip(one.constraints, other.constraints, strict=True))
+    pairs = enumerate(zip(family.constraints, other.constraints, strict=True))
     return [i for i, (mine, its) in pairs if not mine.same_values(its)]
 
 
 def merged(families: list[SingularFamily]) -> list[SingularFamily]:
-    """Families that differ in the values of one constraint alone become one with all these values."""
-    found = list(families)
+    """Join families that differ in the values of one constraint alone into one with all these values."""
+    result = list(families)
     while True:  # what is one now may go with an earlier one
-        pairs = ((i, j, _together(found[i], found[j])) for i, j in combinations(range(len(found)), 2))
+        pairs = ((i, j, _together(result[i], result[j])) for i, j in combinations(range(len(result)), 2))
         merging = next(((i, j, both) for i, j, both in pairs if both is not None), None)
         if merging is None:
-            return found
-        i, j, found[i] = merging
-        del found[j]
+            return result
+        i, j, result[i] = merging
+        del result[j]
 
 
-def _together(one: SingularFamily, other: SingularFamily) -> SingularFamily | None:
-    if one.kind != other.kind:
+def _together(family: SingularFamily, other: SingularFamily) -> SingularFamily | None:
+    if family.kind != other.kind:
         return None
-    different = _different(one, other)
+    different = _different(family, other)
     if len(different) > 1:
         return None
-    constraints = list(one.constraints)
+    constraints = list(family.constraints)
     for i in different:
-        mine, its = one.constraints[i], other.constraints[i].values
+        mine, its = family.constraints[i], other.constraints[i].values
         new = [
             value for value in its if not any(mine._apart(value - old) <= SAME_VALUE for old in mine.values)
         ]
         constraints[i] = replace(mine, values=tuple(sorted([*mine.values, *new])))
     return replace(
-        one,
+        family,
         constraints=tuple(constraints),
-        examples=np.concatenate([one.examples, other.examples]),
-        starts=one.starts + other.starts,
+        examples=np.concatenate([family.examples, other.examples]),
+        starts=family.starts + other.starts,
     )
 
 
 def values_text(values: Iterable[float], unit: str, circular: bool = False) -> str:
     """Several values: "0 or ±π", "±π/2". A circular π is ±π."""
-    found: list[str] = []
+    texts: list[str] = []
     left = sorted(values, key=lambda value: (round(abs(value), 6), -value))
     while left:
         value = left.pop(0)
@@ -220,5 +222,5 @@ def values_text(values: Iterable[float], unit: str, circular: bool = False) -> s
             left.remove(opposite)  # type: ignore[arg-type]  # one was found
         text = value_text(abs(value) if both else value, unit)
         whole_turn = circular and unit == "rad" and abs(abs(value) - np.pi) <= NEAR_PI
-        found.append(f"±{text.lstrip('-')}" if both or whole_turn else text)
-    return listed(found, "or")
+        texts.append(f"±{text.lstrip('-')}" if both or whole_turn else text)
+    return listed(texts, "or")

@@ -32,7 +32,7 @@ def families_of(search: Search, z: Array) -> tuple[SingularFamily, ...]:
     local = localised(search, shaken(search, z))
     common = Counter(local.signature(i) for i in range(len(z)))
     waiting = sorted(range(len(z)), key=lambda i: (local.signature(i)[0], -common[local.signature(i)], i))
-    found: list[SingularFamily] = []
+    families: list[SingularFamily] = []
     while waiting:
         i = waiting[0]
         family = family_at(search, local.z[i])
@@ -41,14 +41,14 @@ def families_of(search: Search, z: Array) -> tuple[SingularFamily, ...]:
             continue
         members = [j for j in waiting if j == i or _belongs(search, family, local, j)]
         family = _with_examples(search, family, local, members)
-        again = next((k for k, one in enumerate(found) if one.same_as(family)), None)
+        again = next((k for k, other in enumerate(families) if other.same_as(family)), None)
         if again is None:
-            found.append(family)
+            families.append(family)
         else:
-            found[again] = replace(found[again], starts=found[again].starts + family.starts)
+            families[again] = replace(families[again], starts=families[again].starts + family.starts)
         waiting = [j for j in waiting if j not in members]
-    found = merged(_completed(search, found))
-    return tuple(sorted(found, key=lambda family: (-family.dimension, -family.starts)))
+    families = merged(_completed(search, families))
+    return tuple(sorted(families, key=lambda family: (-family.dimension, -family.starts)))
 
 
 def family_at(search: Search, z: Array) -> SingularFamily | None:
@@ -105,7 +105,7 @@ def everywhere(search: Search, z: Array, starts: int) -> SingularFamily:
 
 
 def _ties(search: Search, points: Array, free: Flags) -> tuple[tuple[Relation, ...], tuple[str, ...]]:
-    """What stays along the walk (N, a): pinned coordinates and sums; and all that are tied but not pinned."""
+    """Relations along the walk (N, a): pinned coordinates and sums; and all that are tied but not pinned."""
     pinned = ~free & (np.ptp(points, axis=0) <= STAYS)
     tied = np.flatnonzero(~free & ~pinned)
     sums = [{int(j): 1} for j in np.flatnonzero(pinned)]
@@ -113,8 +113,8 @@ def _ties(search: Search, points: Array, free: Flags) -> tuple[tuple[Relation, .
         sums.append({int(j): int(number) for j, number in zip(tied, row, strict=True) if number})
     # Metres and radians do not add up.
     units = [{search.robot.q_units[search.axes[j]] for j in used} for used in sums]
-    found = [_relation(search, points, used) for used, own in zip(sums, units, strict=True) if len(own) == 1]
-    return tuple(found), tuple(search.robot.q_names[j] for j in search.axes[tied])
+    ties = [_relation(search, points, used) for used, own in zip(sums, units, strict=True) if len(own) == 1]
+    return tuple(ties), tuple(search.robot.q_names[j] for j in search.axes[tied])
 
 
 def _relation(search: Search, points: Array, multiples: dict[int, int]) -> Relation:
@@ -136,21 +136,21 @@ def _wrapped(angle: float) -> float:
 
 
 def _whole_rows(D: Array) -> Array:
-    """Rows of whole numbers that are orthogonal to all rows of D (N, k); none where they are not whole."""
+    """Integer vectors of a basis of the null space of D (N, k); those not integer are left out."""
     k = D.shape[1]
     if not k:
         return np.zeros((0, 0))
     _, sizes, rows = np.linalg.svd(D, full_matrices=True)
     thick = int(np.sum(sizes > STAYS * np.sqrt(len(D))))
     R = _echelon(rows[thick:])
-    found = []
+    integer_rows = []
     for row in R:
         for times in range(1, WHOLE + 1):
             whole = np.round(row * times)
             if np.max(np.abs(whole - row * times)) < NEAR_WHOLE and np.max(np.abs(whole)) <= WHOLE:
-                found.append(whole)
+                integer_rows.append(whole)
                 break
-    return np.array(found).reshape(len(found), k)
+    return np.array(integer_rows).reshape(len(integer_rows), k)
 
 
 def _echelon(rows: Array) -> Array:
@@ -181,9 +181,9 @@ def _belongs(search: Search, family: SingularFamily, local: Local, i: int) -> bo
 def _with_examples(
     search: Search, family: SingularFamily, local: Local, members: list[int]
 ) -> SingularFamily:
-    """With its starts and examples, first one whose free coordinates are where `at` has them.
+    """The family with its starts and examples, the first with the free coordinates of `at`, if possible.
 
-    Examples where another family meets are avoided: what is lost there would be that one's.
+    Examples where another family meets are avoided: the directions lost there would be that one's.
     """
     example = search.z(family.examples[:1])
     usual = localised(search, example).signature(0)
@@ -194,8 +194,8 @@ def _with_examples(
         j = search.robot.coordinate(name)
         plain[0, j] = search.at[j]
     plain = search.robot.following.placed(plain)
-    there = localised(search, search.z(plain))
-    if there.rank[0] == family.rank and there.signature(0) == usual:
+    at_plain = localised(search, search.z(plain))
+    if at_plain.rank[0] == family.rank and at_plain.signature(0) == usual:
         q = np.concatenate([plain, q[: EXAMPLES - 1]])
     return replace(family, examples=q, starts=len(members), lost=search.measure.lost_text(q[0], family.rank))
 
@@ -203,7 +203,7 @@ def _with_examples(
 def _holds(search: Search, family: SingularFamily, points: Array, free: Flags) -> bool:
     """Whether J's rank is as low at random members, far away: all members, where nothing else ties them."""
     names = search.robot.q_names
-    named = {name for one in family.constraints for name in one.coefficients} | set(family.free)
+    named = {name for relation in family.constraints for name in relation.coefficients} | set(family.free)
     silent = {names[j] for j in search.moving} - named
     if family.equations < 0 or (silent and not family.equations) or (family.equations and not family.related):
         return False
@@ -223,12 +223,12 @@ def _holds(search: Search, family: SingularFamily, points: Array, free: Flags) -
     return bool(np.all(stay_singular(search.looser(SLACK), search.z(q), rank)))
 
 
-def _completed(search: Search, found: list[SingularFamily]) -> list[SingularFamily]:
-    """With the families at opposite values of a pinned angle or sum, also half a turn away.
+def _completed(search: Search, families: list[SingularFamily]) -> list[SingularFamily]:
+    """Add the families at opposite values of a pinned angle or sum, also half a turn away.
 
-    Random members prove those that no start found.
+    Those that no start found are proved by random members.
     """
-    every = list(found)
+    every = list(families)
     for family in every:  # it grows meanwhile
         for i, relation in enumerate(family.constraints):
             (own,) = relation.values
@@ -242,7 +242,7 @@ def _completed(search: Search, found: list[SingularFamily]) -> list[SingularFami
                     examples=_moved(search, family.examples, relation, value),
                     starts=0,
                 )
-                if not any(one.same_as(twin) for one in every) and _proved(search, twin):
+                if not any(other.same_as(twin) for other in every) and _proved(search, twin):
                     every.append(twin)
     return every
 

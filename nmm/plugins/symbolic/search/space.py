@@ -146,13 +146,13 @@ def search_space(
     *,
     around: bool = False,
 ) -> Search:
-    """The coordinates to search, as `find_singularities` is told; the others stay `at` (n,).
+    """The search space of `find_singularities`; coordinates outside it stay `at` (n,).
 
     With `around`, ranges are centred on `at` within the limits. `SingularError` where J exists nowhere.
     """
     robot = measure.robot
     moving = _moving(robot, among)
-    given = _ranges(robot, moving, ranges)
+    windows = _ranges(robot, moving, ranges)
     own = robot.limited
     lower = np.where(own[:, 0], robot.q_limits[:, 0], -np.inf)
     upper = np.where(own[:, 1], robot.q_limits[:, 1], np.inf)
@@ -162,7 +162,7 @@ def search_space(
     for j in range(robot.n):
         turn = bool(angle[j]) and not around
         window = _default(lower[j], upper[j], 0.0 if turn else at[j], np.pi if angle[j] else span, cut=turn)
-        lower[j], upper[j] = given.get(j) or window
+        lower[j], upper[j] = windows.get(j) or window
     tolerance, none = positive(tolerance, "tolerance"), np.zeros(robot.n, dtype=bool)
     search = Search(measure, at, moving, np.array(moving), lower, upper, none, units, tolerance, rng)
     q = search.q(search.draw(20 * PROBES))
@@ -189,15 +189,15 @@ def _moving(robot: Robot, among: Sequence[str] | None) -> tuple[int, ...]:
     if among is None:
         return tuple(int(j) for j in robot.following.independent)
     names = [among] if isinstance(among, str) else list(among)
-    found = tuple(sorted({robot.independent(name) for name in names}))
-    expect(found, "among", f"coordinates of {', '.join(robot.q_names)}, got none")
-    return found
+    indices = tuple(sorted({robot.independent(name) for name in names}))
+    expect(indices, "among", f"coordinates of {', '.join(robot.q_names)}, got none")
+    return indices
 
 
 def _ranges(
     robot: Robot, moving: Sequence[int], ranges: Mapping[str, tuple[float, float]] | None
 ) -> dict[int, tuple[float, float]]:
-    found = {}
+    windows = {}
     for name, value in (ranges or {}).items():
         j = robot.independent(name)
         if j not in moving:
@@ -205,8 +205,8 @@ def _ranges(
             raise InputError(f"{name} may not move; among are {among}", where="ranges")
         lower, upper = vector(value, 2, f"range of {name}")
         expect(lower < upper, f"range of {name}", f"(lower, upper), got ({lower:g}, {upper:g})")
-        found[j] = (float(lower), float(upper))
-    return found
+        windows[j] = (float(lower), float(upper))
+    return windows
 
 
 def _default(lower: float, upper: float, center: float, half: float, cut: bool) -> tuple[float, float]:
