@@ -62,8 +62,8 @@ def singularity_map(
     Examples
     --------
     >>> robot = nmm.load("unicycle_2r")
-    >>> found = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), ("q1", "q2"), samples=20)
-    >>> found.rank.shape, sorted(found.values)
+    >>> result = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), ("q1", "q2"), samples=20)
+    >>> result.rank.shape, sorted(result.values)
     ((20, 20), ['sigma_min'])
     """
     evaluator = Evaluator(subject, **judged)
@@ -82,17 +82,17 @@ def singularity_map(
         return robot.following.placed(q)
 
     points = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
-    found = evaluator(placed(points), between(progress, 0.0, 0.8), arm=evaluator.arm_beside)
+    evaluated = evaluator(placed(points), between(progress, 0.0, 0.8), arm=evaluator.arm_beside)
     full = len(evaluator.jacobians.rows)
 
-    def singular(name: str, those: Smallness, report: Progress | None) -> SingularSet:
+    def singular(name: str, nodes: Smallness, report: Progress | None) -> SingularSet:
         J_of = evaluator.part_of(name)
-        smallness = (those.sigma.reshape(shape), those.volume.reshape(shape))
-        rank = those.rank.reshape(shape)
+        smallness = (nodes.sigma.reshape(shape), nodes.volume.reshape(shape))
+        rank = nodes.rank.reshape(shape)
         return singular_set(lambda x: J_of(placed(x)), smallness, rank, full, axes, report)
 
-    whole = singular(evaluator.part, found.own, between(progress, 0.8, 0.1))
-    arm = None if found.arm is None else singular("arm", found.arm, between(progress, 0.9, 0.1))
+    whole = singular(evaluator.part, evaluated.own, between(progress, 0.8, 0.1))
+    arm = None if evaluated.arm is None else singular("arm", evaluated.arm, between(progress, 0.9, 0.1))
     if progress is not None:
         progress(1.0)
     return Map(
@@ -102,8 +102,8 @@ def singularity_map(
         names=names,
         units=(robot.q_units[columns[0]], robot.q_units[columns[1]]),
         axes=axes,
-        values={name: values.reshape(shape) for name, values in found.values.items()},
-        rank=found.own.rank.reshape(shape),
+        values={name: values.reshape(shape) for name, values in evaluated.values.items()},
+        rank=evaluated.own.rank.reshape(shape),
         singular=whole,
         arm_singular=arm,
         q=held,
@@ -111,18 +111,18 @@ def singularity_map(
 
 
 def coordinates(over: Sequence[str], robot: Robot) -> tuple[tuple[str, str], list[int]]:
-    given = [over] if isinstance(over, str) else list(over)
-    expect(len(given) == 2, "over", "two coordinates, as in ('q1', 'q2')", over)
-    columns = [robot.independent(name) for name in given]
-    expect(columns[0] != columns[1], "over", f"two different coordinates, got {given[0]} twice")
-    return (given[0], given[1]), columns
+    names = [over] if isinstance(over, str) else list(over)
+    expect(len(names) == 2, "over", "two coordinates, as in ('q1', 'q2')", over)
+    columns = [robot.independent(name) for name in names]
+    expect(columns[0] != columns[1], "over", f"two different coordinates, got {names[0]} twice")
+    return (names[0], names[1]), columns
 
 
 def check_held(
-    given: Iterable[str], varied: Sequence[str], what: str, how: str = "on an axis of the map"
+    fixed: Iterable[str], varied: Sequence[str], what: str, how: str = "on an axis of the map"
 ) -> None:
-    """`InputError` for a coordinate that is given one value and is varied: that value would not count."""
-    for name in given:
+    """`InputError` for a coordinate that is both fixed and varied: its value would not count."""
+    for name in fixed:
         if name in varied:
             raise InputError(f"{name} is {how} ({', '.join(varied)})", where=what)
 
@@ -144,21 +144,21 @@ def grid_axes(
     ranges: Mapping[str, Sequence[float]] | None,
     counts: tuple[int, int],
 ) -> tuple[Array, Array]:
-    given = dict(ranges or {})
-    for name in given:
+    spans = dict(ranges or {})
+    for name in spans:
         if name not in names:
             robot.coordinate(name)  # names the ones there are
             raise InputError(f"{name} is not on an axis of the map ({', '.join(names)})", where="ranges")
     ends = [
-        checked_range(given[name], name) if name in given else usual_range(robot, name, held)
+        checked_range(spans[name], name) if name in spans else usual_range(robot, name, held)
         for name in names
     ]
     return np.linspace(*ends[0], counts[0]), np.linspace(*ends[1], counts[1])
 
 
-def checked_range(given: Sequence[float], name: str) -> tuple[float, float]:
-    """(lower, upper) with room between them."""
-    lower, upper = vector(given, 2, f"range of {name}")
+def checked_range(span: Sequence[float], name: str) -> tuple[float, float]:
+    """A range (lower, upper), checked: lower < upper, neither too far."""
+    lower, upper = vector(span, 2, f"range of {name}")
     where, got = f"range of {name}", f"got {lower:g} to {upper:g}"
     expect(lower < upper, where, f"lower below upper, {got}")
     expect(max(-lower, upper) <= FARTHEST, where, f"no more than {FARTHEST:g} to either side, {got}")

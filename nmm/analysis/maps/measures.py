@@ -30,10 +30,10 @@ def spectra_of(J: Array, columns: Mapping[str, Sequence[int]]) -> dict[str, Arra
     """Singular values (N, s) of J (N, s, m) by part; 0 where inputs are missing, NaN where there is no J."""
     undefined = np.asarray(~np.isfinite(J).all(axis=(1, 2)))
     J = np.where(undefined[:, np.newaxis, np.newaxis], 0.0, J) if undefined.any() else J
-    found = {part: singular_values(some_columns(J, own)) for part, own in columns.items()}
-    for values in found.values():
+    by_part = {part: singular_values(some_columns(J, own)) for part, own in columns.items()}
+    for values in by_part.values():
         values[undefined] = np.nan
-    return found
+    return by_part
 
 
 def volume(values: Array) -> Array:
@@ -148,8 +148,8 @@ class Judged(TypedDict, total=False):
     --------
     >>> robot = nmm.load("unicycle_2r")
     >>> judged = nmm.analysis.Judged(measures="manipulability", part="arm")
-    >>> found = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), samples=20, **judged)
-    >>> list(found.values), found.about.part
+    >>> result = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), samples=20, **judged)
+    >>> list(result.values), result.about.part
     (['manipulability'], 'arm')
     """
 
@@ -222,14 +222,14 @@ class Evaluator:
         """All measures at q (N, n); the arm's only if it is asked for: singular values take long."""
         parts = {WHOLE, self.part}.union(*(measure.parts for measure in self.measures.values()))
         columns = {name: self.columns[name] for name in (parts | {"arm"} if arm else parts)}
-        found = []
+        chunks = []
         for first in range(0, len(q), CHUNK):
             J = self.J(q[first : first + CHUNK], between(progress, first / len(q), CHUNK / len(q)))
-            found.append(self._evaluated(spectra_of(J, columns), arm))
+            chunks.append(self._evaluated(spectra_of(J, columns), arm))
         return Evaluated(
-            {name: np.concatenate([one.values[name] for one in found]) for name in self.measures},
-            Smallness(*map(np.concatenate, zip(*(one.own for one in found), strict=True))),
-            Smallness(*map(np.concatenate, zip(*(one.arm for one in found if one.arm), strict=True)))
+            {name: np.concatenate([chunk.values[name] for chunk in chunks]) for name in self.measures},
+            Smallness(*map(np.concatenate, zip(*(chunk.own for chunk in chunks), strict=True))),
+            Smallness(*map(np.concatenate, zip(*(chunk.arm for chunk in chunks if chunk.arm), strict=True)))
             if arm
             else None,
         )

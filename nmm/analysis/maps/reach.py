@@ -48,12 +48,12 @@ class Plane(NamedTuple):
 
 @compiled
 def rated(integers: Integers, floats: Array, plane: Plane, q: Array, point: Array, rates: Array) -> None:
-    """Writes point (3,), the frame at q (n,), and rates (s, k) of its constrained coordinates."""
-    here = views(Kinematics, integers, floats, 0)
+    """Write the frame's position at q (n,) to point (3,), and rates (s, k) of its constrained coordinates."""
+    kinematics = views(Kinematics, integers, floats, 0)
     n = q.shape[0]
     placement, J, none = scratch((1, 3, 4)), scratch((1, 6, n)), scratch((0, 6, n, n))
     clear(J)
-    place_frames(here.joints, here.frames, q, placement, J, none)
+    place_frames(kinematics.joints, kinematics.frames, q, placement, J, none)
     for i in range(3):
         point[i] = placement[0, i, 3]
     for i in range(rates.shape[0]):
@@ -146,28 +146,28 @@ def lead_onto(
     Writes points (N, 3), and left (N,), the distances: infinite where no step was in the slab.
     """
     n, k = q.shape[1], plane.moving.shape[0]
-    here, point, rates = scratch(n), scratch(3), scratch((2 if math.isinf(plane.slab[0]) else 3, k))
+    posture, point, rates = scratch(n), scratch(3), scratch((2 if math.isinf(plane.slab[0]) else 3, k))
     for p in range(q.shape[0]):
         x, y = targets[p, 0], targets[p, 1]
         for j in range(n):
-            here[j] = q[p, j]
+            posture[j] = q[p, j]
         left[p] = math.inf
         for i in range(3):
             points[p, i] = 0.0
         for taken in range(steps + 1):
-            rated(integers, floats, plane, here, point, rates)
+            rated(integers, floats, plane, posture, point, rates)
             across, along = point[plane.axes[0]] - x, point[plane.axes[1]] - y
             apart = math.sqrt(across * across + along * along)
             height = point[plane.third[0]]
             if plane.slab[0] <= height <= plane.slab[1] and apart < left[p]:
                 left[p] = apart
                 for j in range(n):
-                    q[p, j] = here[j]
+                    q[p, j] = posture[j]
                 for i in range(3):
                     points[p, i] = point[i]
             if taken == steps or not left[p] > near:
                 break
-            advance(plane, here, x, y, point, rates)
+            advance(plane, posture, x, y, point, rates)
 
 
 class Reach:
@@ -192,10 +192,10 @@ class Reach:
         (self.third,) = {0, 1, 2} - set(self.in_plane)
         self.moving = moving
         names = [robot.q_names[j] for j in moving]
-        given = dict(ranges or {})
-        for name in given:
+        spans = dict(ranges or {})
+        for name in spans:
             expect_known("joint", name, names, "ranges")
-        limits = [checked_range(given[name], name) if name in given else self._usual(name) for name in names]
+        limits = [checked_range(spans[name], name) if name in spans else self._usual(name) for name in names]
         self.lower, self.upper = np.ascontiguousarray(np.array(limits).reshape(-1, 2).T)
         who = robot.following
         self._path = FramePath(robot, frame)
@@ -241,13 +241,13 @@ class Reach:
 
     def towards(self, q: Array, targets: Array) -> Array:
         """Configurations (N, n) a Newton step nearer to targets (N, 2) in the plane, in ranges and slab."""
-        found = np.array(q, order="C")
+        moved = np.array(q, order="C")
 
         def step(first: int, last: int) -> None:
-            step_towards(*self._path.blocks, self._plane, found[first:last], targets[first:last])
+            step_towards(*self._path.blocks, self._plane, moved[first:last], targets[first:last])
 
         over_cores(len(q), AT_ONCE, lambda: step)
-        return found
+        return moved
 
     def onto(
         self, q: Array, targets: Array, near: float, progress: Progress | None = None
@@ -259,8 +259,8 @@ class Reach:
         best, points, left = np.array(q, order="C"), np.empty((len(q), 3)), np.empty(len(q))
 
         def lead(first: int, last: int) -> None:
-            goals, *found = (each[first:last] for each in (targets, best, points, left))
-            lead_onto(*self._path.blocks, self._plane, goals, near, STEPS, *found)
+            goals, *outputs = (each[first:last] for each in (targets, best, points, left))
+            lead_onto(*self._path.blocks, self._plane, goals, near, STEPS, *outputs)
 
         over_cores(len(q), AT_ONCE, lambda: lead, progress)
         return best, points, left

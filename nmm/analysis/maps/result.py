@@ -33,8 +33,8 @@ class Extreme(NamedTuple):
     Examples
     --------
     >>> robot = nmm.load("unicycle_2r")
-    >>> found = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), samples=20)
-    >>> smallest = found.extremes("sigma_min")["smallest"]
+    >>> result = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), samples=20)
+    >>> smallest = result.extremes("sigma_min")["smallest"]
     >>> isinstance(smallest, nmm.analysis.Extreme), round(smallest.value, 4)
     (True, 0.2135)
     """
@@ -58,8 +58,8 @@ class About:
     Examples
     --------
     >>> robot = nmm.load("unicycle_2r")
-    >>> found = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), samples=20)
-    >>> isinstance(found.about, nmm.analysis.About), found.about.robot, found.about.task
+    >>> result = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), samples=20)
+    >>> isinstance(result.about, nmm.analysis.About), result.about.robot, result.about.task
     (True, 'unicycle_2r', ('ee.x', 'ee.y'))
     """
 
@@ -131,8 +131,8 @@ class Map:
     Examples
     --------
     >>> robot = nmm.load("unicycle_2r")
-    >>> found = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), samples=20)
-    >>> sorted(path.name for path in found.save("map").iterdir())
+    >>> result = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), samples=20)
+    >>> sorted(path.name for path in result.save("map").iterdir())
     ['map.json', 'map.npz', 'sigma_min.png']
     """
 
@@ -169,42 +169,42 @@ class Map:
 
         Parameters
         ----------
-        worst : of a workspace's worst postures. The best ones are not those that are singular, so only of the
-            worst the singular places tell a value
+        worst : of a workspace's worst postures; there the singular places count, among the best they do not,
+            as the best posture is not the singular one
         """
         values = (self.worst if worst else self.values)[measure]
-        found = {}
+        extremes = {}
         for end, pick in (("smallest", np.nanargmin), ("largest", np.nanargmax)):
             if np.isnan(values).all():
-                found[end] = Extreme(np.nan, (np.nan, np.nan))
+                extremes[end] = Extreme(np.nan, (np.nan, np.nan))
                 continue
             row, column = np.unravel_index(pick(values), values.shape)
             where = float(self.axes[0][column]), float(self.axes[1][row])
-            found[end] = Extreme(float(values[row, column]), where)
+            extremes[end] = Extreme(float(values[row, column]), where)
         known = self._singular_sets(measure)
         between = known if self.kind == "coordinates" or worst else []
         value = MEASURES[measure].where_singular
-        everywhere = any(those.everywhere for those, _ in known)
-        seen = [found["smallest"].value, found["largest"].value, *([value] if between else [])]
+        everywhere = any(singular.everywhere for singular, _ in known)
+        seen = [extremes["smallest"].value, extremes["largest"].value, *([value] if between else [])]
         if everywhere or max(seen) - min(seen) <= SAME * max(map(abs, seen)):
             return {
-                end: Extreme(value if everywhere else one.value, one.at, EVERYWHERE)
-                for end, one in found.items()
+                end: Extreme(value if everywhere else extreme.value, extreme.at, EVERYWHERE)
+                for end, extreme in extremes.items()
             }
-        for those, whose in between[:1]:
-            x, y = (those.lines[0] if those.lines else those.points)[0]
-            on = f"the {whose}singular {' and '.join(those.kinds)}"
-            found["largest" if value > 0.0 else "smallest"] = Extreme(value, (float(x), float(y)), on)
-        return found
+        for singular, whose in between[:1]:
+            x, y = (singular.lines[0] if singular.lines else singular.points)[0]
+            on = f"the {whose}singular {' and '.join(singular.kinds)}"
+            extremes["largest" if value > 0.0 else "smallest"] = Extreme(value, (float(x), float(y)), on)
+        return extremes
 
     def _singular_sets(self, measure: str) -> list[tuple[SingularSet, str]]:
-        """The sets on which a measure has its value where singular, and whose they are ("" or "arm's ")."""
-        part, found = self.about.part, []
+        """The singular sets that give a measure its value `where_singular`, and whose: "" or "arm's "."""
+        part, sets = self.about.part, []
         if measure == "arm_manipulability":
-            found.append((self.singular if part == "arm" else self.arm_singular, "arm's "))
+            sets.append((self.singular if part == "arm" else self.arm_singular, "arm's "))
         if part == WHOLE or not MEASURES[measure].parts:
-            found.append((self.singular, ""))
-        return [(those, whose) for those, whose in found if those is not None and not those.empty]
+            sets.append((self.singular, ""))
+        return [(singular, whose) for singular, whose in sets if singular is not None and not singular.empty]
 
     @property
     def held(self) -> dict[str, float]:

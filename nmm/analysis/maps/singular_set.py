@@ -49,8 +49,8 @@ class SingularSet:
     Examples
     --------
     >>> robot = nmm.load("unicycle_2r")
-    >>> found = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), samples=20, part="arm")
-    >>> isinstance(found.singular, nmm.analysis.SingularSet), found.singular.text()
+    >>> result = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), samples=20, part="arm")
+    >>> isinstance(result.singular, nmm.analysis.SingularSet), result.singular.text()
     (True, 'lines')
     """
 
@@ -101,10 +101,10 @@ def singular_set(
     last = np.array([len(axis) - 1.0 for axis in axes])
     rows, columns = np.nonzero(np.any([candidates(values) for values in smallness], axis=0))
     start = np.column_stack([columns, rows]).astype(np.float64)
-    found = polish(lambda x: J_of(origin + cell * x), start, progress=progress)
+    singular = polish(lambda x: J_of(origin + cell * x), start, progress=progress)
     # The ends of a range are in it, whatever the rounding.
-    found = found[np.all((found > -1e-6) & (found < last + 1e-6), axis=1)]
-    lines, points = curves_and_points(np.clip(found, 0.0, last))
+    singular = singular[np.all((singular > -1e-6) & (singular < last + 1e-6), axis=1)]
+    lines, points = curves_and_points(np.clip(singular, 0.0, last))
     return SingularSet(tuple(origin + cell * line for line in lines), origin + cell * points)
 
 
@@ -130,9 +130,9 @@ def _finer(
 
 
 def candidates(values: Array) -> Array:
-    """Nodes (rows, columns) that are lowest along the row or the column, where zero may be near."""
+    """Nodes (rows, columns) that are minima along their row or column, where zero may be near."""
     lower = np.where(np.isnan(values), np.inf, values)
-    found = np.zeros(values.shape, dtype=bool)
+    lowest = np.zeros(values.shape, dtype=bool)
     for axis in (0, 1):
         around = np.pad(lower, [(1, 1) if k == axis else (0, 0) for k in (0, 1)], constant_values=np.inf)
         count = values.shape[axis]
@@ -143,8 +143,8 @@ def candidates(values: Array) -> Array:
         minimum = (lower <= before) & (lower <= after) & ((lower < before) | (lower < after))
         at_edge = ~(np.isfinite(before) & np.isfinite(after))
         with np.errstate(invalid="ignore"):
-            found |= minimum & (at_edge | (lower <= STEEP * (higher - lower))) & np.isfinite(lower)
-    return found
+            lowest |= minimum & (at_edge | (lower <= STEEP * (higher - lower))) & np.isfinite(lower)
+    return lowest
 
 
 def polish(
@@ -175,17 +175,17 @@ def polish(
         going, J, U, values, Vt = going[on], J[on], U[on], values[on], Vt[on]
         if not len(going):
             break
-        here = x[going]
-        best, best_J, best_volume = here.copy(), J, np.prod(values, axis=1)
-        for step in _steps(J_of, here, U, values, Vt):
+        current = x[going]
+        best, best_J, best_volume = current.copy(), J, np.prod(values, axis=1)
+        for step in _steps(J_of, current, U, values, Vt):
             length = np.linalg.norm(step, axis=1)
             shorter = np.minimum(1.0, reach[going] / np.where(length == 0.0, 1.0, length))
-            trial = here + step * shorter[:, np.newaxis]
+            trial = current + step * shorter[:, np.newaxis]
             J_trial = J_of(trial)
             volume = np.prod(spectra(J_trial), axis=1)
             better = volume < best_volume  # not where there is no J
             best[better], best_J[better], best_volume[better] = trial[better], J_trial[better], volume[better]
-        moved = np.linalg.norm(best - here, axis=1)
+        moved = np.linalg.norm(best - current, axis=1)
         x[going], J = best, best_J
         reach[going] = np.where(moved == 0.0, 0.25 * reach[going], reach[going])
         near = np.linalg.norm(x[going] - start[going], axis=1) <= farthest
@@ -205,14 +205,14 @@ def _steps(J_of: Callable[[Array], Array], x: Array, U: Array, values: Array, Vt
     beside = np.concatenate([*(x + way for way in ways), *(x - way for way in ways)])
     ahead, behind = J_of(beside).reshape(2, len(ways), *U.shape[:2], -1)
     rates = np.nan_to_num(np.stack(list((ahead - behind) / (2.0 * STEP)), axis=-1))  # (N, s, m, d)
-    found = np.empty((2, *x.shape))
+    steps = np.empty((2, *x.shape))
 
     def write(first: int, last: int) -> None:
         some = slice(first, last)
-        found[:, some] = _shortest(rates[some], U[some], values[some], Vt[some])
+        steps[:, some] = _shortest(rates[some], U[some], values[some], Vt[some])
 
     over_cores(len(x), AT_ONCE, lambda: write)
-    return found
+    return steps
 
 
 def _shortest(rates: Array, U: Array, values: Array, Vt: Array) -> Array:
@@ -269,11 +269,11 @@ def curves_and_points(points: Array) -> tuple[list[Array], Array]:
         # Points beside a curve belong to it.
         distance, _ = cKDTree(np.vstack(curves)).query(alone)
         alone = alone[distance > LINK]
-    kept = np.zeros((0, 2))
+    isolated = np.zeros((0, 2))
     for point in alone:  # one of each few that are the same up to a fraction of a cell
-        if np.all(np.linalg.norm(kept - point, axis=1) > 2.0 * SAME):
-            kept = np.vstack([kept, point])
-    return curves, kept
+        if np.all(np.linalg.norm(isolated - point, axis=1) > 2.0 * SAME):
+            isolated = np.vstack([isolated, point])
+    return curves, isolated
 
 
 def _tangents(points: Array, neighbours: list[Array]) -> tuple[Array, Array]:
@@ -291,9 +291,9 @@ def _walk(points: Array, neighbours: list[Array], free: Array, start: int, direc
     """Successive points from `start`, turning little; at a crossing, up to CROSSING of another curve."""
     path, taken, borrowed = [start], {start}, 0
     while borrowed <= CROSSING:
-        here = path[-1]
-        near = np.array([i for i in neighbours[here] if i not in taken], dtype=np.int64)
-        offsets = points[near] - points[here]
+        current = path[-1]
+        near = np.array([i for i in neighbours[current] if i not in taken], dtype=np.int64)
+        offsets = points[near] - points[current]
         lengths = np.linalg.norm(offsets, axis=1)
         cosines = offsets @ direction / np.where(lengths == 0.0, 1.0, lengths)
         ahead = cosines > np.where(free[near], TURN, STRAIGHT)
@@ -302,7 +302,7 @@ def _walk(points: Array, neighbours: list[Array], free: Array, start: int, direc
         # The nearest; of two that are as near, the one straight on.
         costs = np.where(ahead, lengths / np.where(ahead, cosines, 1.0) ** 2, np.inf)
         best = int(near[np.argmin(costs)])
-        step = (points[best] - points[here]) / lengths[np.argmin(costs)]
+        step = (points[best] - points[current]) / lengths[np.argmin(costs)]
         borrowed = 0 if free[best] else borrowed + 1
         path.append(best)
         taken.add(best)

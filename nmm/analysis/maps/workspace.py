@@ -80,8 +80,8 @@ def workspace_map(
     Examples
     --------
     >>> robot = nmm.load("unicycle_2r")
-    >>> found = nmm.analysis.workspace_map((robot, nmm.Position("ee", "xy")), samples=40, configurations=1024)
-    >>> found.kind, found.names
+    >>> area = nmm.analysis.workspace_map((robot, nmm.Position("ee", "xy")), samples=40, configurations=1024)
+    >>> area.kind, area.names
     ('workspace', ('x', 'y'))
     """
     evaluator = Evaluator(subject, **judged)
@@ -106,7 +106,7 @@ def workspace_map(
     shares /= shares.sum()
     ends = zip(shares.cumsum(), shares, strict=True)
     drawing, spreading, filling, evening, ours, arms = (
-        between(progress, end - one, one) for end, one in ends
+        between(progress, end - share, share) for end, share in ends
     )
     search = Search(evaluator, reach, longest, 1 << (count - 1).bit_length(), drawing)
     search.spread(spreading)
@@ -137,13 +137,13 @@ def workspace_map(
     )
 
 
-def check_given(given: Iterable[str], subject: Subject, frame: str | None, q: Array, what: str) -> None:
-    """`InputError` for one of the coordinates `given` a value, in `what`, that `workspace_map` varies."""
+def check_given(fixed: Iterable[str], subject: Subject, frame: str | None, q: Array, what: str) -> None:
+    """`InputError` for one of the coordinates `fixed`, in `what`, that `workspace_map` varies."""
     evaluator = Evaluator(subject)
     robot = evaluator.robot
-    if any(robot.coordinate(name) >= robot.platform.n_p for name in given):
+    if any(robot.coordinate(name) >= robot.platform.n_p for name in fixed):
         moving = _moving(evaluator, _task_frame(evaluator) if frame is None else frame, q)
-        check_held(given, [robot.q_names[j] for j in moving], what, VARIED)
+        check_held(fixed, [robot.q_names[j] for j in moving], what, VARIED)
 
 
 def _task_frame(evaluator: Evaluator) -> str:
@@ -189,7 +189,7 @@ def _check_plane(reach: Reach) -> None:
 
 
 def _singular_places(evaluator: Evaluator, reach: Reach, part: str, progress: Progress | None) -> SingularSet:
-    """Where postures put the frame in which the part is singular: the singular ones nearest to some drawn."""
+    """Positions of the frame in singular postures of the part, those nearest to some drawn postures."""
     if len(evaluator.columns[part]) < len(evaluator.jacobians.rows):
         return SingularSet(everywhere=True)
     size = reach.upper - reach.lower
@@ -199,11 +199,11 @@ def _singular_places(evaluator: Evaluator, reach: Reach, part: str, progress: Pr
         return reach.placed(reach.lower + UNIT * size * x)
 
     start = (reach.postures(SINGULAR_STARTS)[:, reach.moving] - reach.lower) / (UNIT * size)
-    found = polish(lambda x: J_of(placed(x)), start, FARTHEST, STEPS, progress)
-    if np.array_equal(found, start):  # not one needed a step
+    singular = polish(lambda x: J_of(placed(x)), start, FARTHEST, STEPS, progress)
+    if np.array_equal(singular, start):  # not one needed a step
         return SingularSet(everywhere=True)
-    found = found[np.all((found > -1e-9) & (UNIT * found < 1.0 + 1e-9), axis=1)]
-    points = reach.positions(placed(found))
+    singular = singular[np.all((singular > -1e-9) & (UNIT * singular < 1.0 + 1e-9), axis=1)]
+    points = reach.positions(placed(singular))
     return in_curves(points[reach.held(points)][:, reach.in_plane])
 
 
