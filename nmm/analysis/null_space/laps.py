@@ -172,30 +172,30 @@ class Repeatability:
     period: float
 
     def __getitem__(self, name: str) -> Laps:
-        for one in self.laps:
-            if one.name == name:
-                return one
-        raise no_such("resolver", name, [one.name for one in self.laps], "laps")
+        for run in self.laps:
+            if run.name == name:
+                return run
+        raise no_such("resolver", name, [run.name for run in self.laps], "laps")
 
     @property
     def complete(self) -> bool:
-        """Whether all went as many laps as asked."""
-        return all(one.finished for one in self.laps)
+        """Whether all went the requested laps."""
+        return all(run.finished for run in self.laps)
 
     @property
     def transient(self) -> Finding:
-        """What to know of the first lap, "first_lap"."""
-        first = max((float(one.errors[0]) for one in self.laps if len(one.errors)), default=0.0)
+        """How far from the path the first lap begins, "first_lap"."""
+        first = max((float(run.errors[0]) for run in self.laps if len(run.errors)), default=0.0)
         return Finding("first_lap", {"error": first, "on_path": first <= CLOSED})
 
     def text(self) -> str:
         """Drift and verdict of each, for people."""
         lines = [f"period {self.period:.6g} s; {self.transient}"]
-        for one in self.laps:
-            drifts = ", ".join(f"{value:.2g}" for value in one.distance)
-            lines.append(f"{one.name}: {one.verdict}" + (f" (lap by lap {drifts})" if drifts else ""))
-            if one.winding:
-                lines.append(f"{' ' * len(one.name)}  {one.winding}")
+        for run in self.laps:
+            drifts = ", ".join(f"{value:.2g}" for value in run.distance)
+            lines.append(f"{run.name}: {run.verdict}" + (f" (lap by lap {drifts})" if drifts else ""))
+            if run.winding:
+                lines.append(f"{' ' * len(run.name)}  {run.winding}")
         return "\n".join(lines)
 
 
@@ -226,7 +226,7 @@ def repeatability(
     Examples
     --------
     >>> both = nmm.analysis.repeatability(nmm.Scenario.load("unicycle_2r_position"), laps=2, dt=0.02)
-    >>> both.complete, [one.name for one in both.laps]
+    >>> both.complete, [run.name for run in both.laps]
     (True, ['rg', 'pg'])
     """
     laps = counted(laps, "laps")
@@ -250,7 +250,7 @@ def repeatability(
     for controller in controllers.values():
         expect_periodic(controller, start, T, laps)
     samples = max(1, math.ceil(T / positive(0.005 if dt is None else dt, "dt") - 1e-9))
-    found = []
+    runs = []
     for k, (name, controller) in enumerate(controllers.items()):
         report = between(progress, k / len(controllers), 1.0 / len(controllers))
         if name in scenarios:
@@ -259,10 +259,10 @@ def repeatability(
         else:
             trajectory = simulate(controller, q0, laps * T, T / samples, progress=report)
         ends = np.arange(min(laps, (len(trajectory) - 1) // samples) + 1) * samples
-        found.append(Laps(name, trajectory, T, laps, trajectory.q[ends], trajectory.error_norm[ends]))
+        runs.append(Laps(name, trajectory, T, laps, trajectory.q[ends], trajectory.error_norm[ends]))
         if trajectory.outcome is Outcome.INTERRUPTED:
             break
-    return Repeatability(tuple(found), T)
+    return Repeatability(tuple(runs), T)
 
 
 #: References may differ by this after a period, m and rad.
@@ -272,7 +272,7 @@ MOST_ROUNDS = 12
 
 
 def common_period(controllers: Iterable[Controller], q: Array) -> float:
-    """The time in which all task references come round, s; those that depend on q are taken at q (n,)."""
+    """The common period of all task references, s; those that depend on q are evaluated at q (n,)."""
     periods: list[float] = []
     for controller in controllers:
         configuration = Configuration(controller.robot, q)
@@ -284,9 +284,9 @@ def common_period(controllers: Iterable[Controller], q: Array) -> float:
     longest = max(periods)
     for rounds in range(1, MOST_ROUNDS + 1):
         T = rounds * longest
-        if all(abs(T / one - round(T / one)) < 1e-9 * T / one for one in periods):
+        if all(abs(T / period - round(T / period)) < 1e-9 * T / period for period in periods):
             return T
-    each = ", ".join(f"{one:.6g} s" for one in dict.fromkeys(periods))
+    each = ", ".join(f"{period:.6g} s" for period in dict.fromkeys(periods))
     what = f"the references go round in {each}, which have no common period"
     raise InputError(what, where="period", expected="the time after which all are back")
 

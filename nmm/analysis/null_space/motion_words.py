@@ -166,8 +166,8 @@ class _Skeleton:
             return slides if stays else _signed(name, "extends", "retracts", growth)
         # Where the link before begins, at a turning joint; and where the one after ends, or the arm.
         above, (below, tip) = self._above(joint), self._below(joint)
-        start = _off_axis([self.origins[one] for one in above if one in self.turning], axis, origin)
-        end = _off_axis([*(self.origins[one] for one in below), tip], axis, origin)
+        start = _off_axis([self.origins[i] for i in above if i in self.turning], axis, origin)
+        end = _off_axis([*(self.origins[i] for i in below), tip], axis, origin)
         roll = self._is_roll(joint, axis, origin)
         if start is not None and end is not None and not roll and not self._is_shoulder(joint, axis):
             return _elbow(name, axis, start - origin, end - origin)
@@ -182,8 +182,8 @@ class _Skeleton:
     def _is_shoulder(self, joint: int, axis: Array) -> bool:
         """Whether the joints before one only turn the arm about a line that is not parallel to its axis."""
         axes = [self.axes[above] for above in self._above(joint) if above in self.turning]
-        column = len(axes) == 1 or all(abs(one[2]) > UPRIGHT for one in axes)
-        return column and all(float(np.linalg.norm(np.cross(one, axis))) > PARALLEL for one in axes)
+        column = len(axes) == 1 or all(abs(other[2]) > UPRIGHT for other in axes)
+        return column and all(float(np.linalg.norm(np.cross(other, axis))) > PARALLEL for other in axes)
 
     def _is_roll(self, joint: int, axis: Array, origin: Array) -> bool:
         """Whether the arm continues along a joint's axis rather than across it.
@@ -191,11 +191,11 @@ class _Skeleton:
         Judged by Denavit-Hartenberg lengths, which depend on neither posture nor joint origins.
         """
         above, (below, end) = self._above(joint), self._below(joint)
-        if not any(one in self.turning for one in above):
+        if not any(i in self.turning for i in above):
             return False
         feet, gaps = [], []
         for neighbours in (above, below):
-            turning = next((one for one in neighbours if one in self.turning), None)
+            turning = next((i for i in neighbours if i in self.turning), None)
             point = end if turning is None else self.origins[turning]
             # Behind a prismatic joint an axis does not stay where it is: there its origin counts.
             rigid = turning is not None and turning == neighbours[0]
@@ -212,13 +212,13 @@ class _Skeleton:
         return max((float(np.linalg.norm(self.origins[a] - self.origins[b])) for a, b in pairs), default=0.0)
 
     def _above(self, joint: int) -> list[int]:
-        """The arm's joints before one, the nearest first."""
-        found = []
+        """The arm's joints before a joint, the nearest first."""
+        joints = []
         above = int(self.model.parents[joint])
         while above in self.arm:
-            found.append(above)
+            joints.append(above)
             above = int(self.model.parents[above])
-        return found
+        return joints
 
     def _below(self, joint: int) -> tuple[list[int], Array]:
         """The joints after one, the nearest first, and the arm's end; of several branches the first."""

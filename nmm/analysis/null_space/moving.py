@@ -180,17 +180,17 @@ def held(jacobians: Jacobians, t: float, q: Array) -> Stack:
 
 
 def _nearby(jacobians: Jacobians, t: float, q: Array, rank: int) -> Array:
-    """J (k, s, m) at some configurations about q, where its rank is the same."""
+    """J (k, s, m) at random configurations about q; `SingularError` where its rank is larger there."""
     near = q + AROUND * np.random.default_rng(0).uniform(-1.0, 1.0, (8, q.size))
-    found = jacobians.batch(near, t)
-    found = found[np.isfinite(found).all(axis=(1, 2))]
-    most = max((jacobians.rank(J, TOLERANCE) for J in found), default=rank)
+    J_near = jacobians.batch(near, t)
+    J_near = J_near[np.isfinite(J_near).all(axis=(1, 2))]
+    most = max((jacobians.rank(J, TOLERANCE) for J in J_near), default=rank)
     if most > rank:
         raise SingularError(
             f"J has rank {rank} at q and {most} nearby: q is singular, and a motion that leaves "
             "the task at rest there moves it a little further on; expected a q that is not singular"
         )
-    return found
+    return J_near
 
 
 class _Motion:
@@ -233,19 +233,19 @@ class _Motion:
     def _velocity(self, q: Array, rate: float) -> Array:
         """q_dot at q (n,), ‖u‖ being `rate` but for what holds the task."""
         self._solve(self.t, q)
-        given = self.field, self.e0, self.angular, self.last, rate, GAIN, self.along
-        found = self._follow(*self.controller.solver.blocks, *given)
-        if found == UNDEFINED:
+        arguments = self.field, self.e0, self.angular, self.last, rate, GAIN, self.along
+        outcome = self._follow(*self.controller.solver.blocks, *arguments)
+        if outcome == UNDEFINED:
             raise Ended(self.robot.platform.problem(q[: self.robot.platform.n_p]) or "the task is undefined")
-        if found == ALONE:
+        if outcome == ALONE:
             names = listed([self.robot.u_names[column] for column in self.field.columns])
             raise Ended(f"{names} alone come close to a singular configuration")
-        if found != FOLLOWED:
-            raise Ended(WORDS[found])
+        if outcome != FOLLOWED:
+            raise Ended(WORDS[outcome])
         return self._q_dot.copy()
 
     def _sample(self, time: float, q: Array) -> Step:
-        found = self.controller.last(time, q)
+        step = self.controller.last(time, q)
         lower, upper = self.robot.q_limits.T
         beyond = np.flatnonzero((q < lower - 1e-9) | (q > upper + 1e-9))
         names = [self.robot.q_names[i] for i in beyond if i in self.robot.following.independent]
@@ -254,7 +254,7 @@ class _Motion:
         problem = self.robot.platform.problem(q[: self.robot.platform.n_p])
         if problem is not None:
             raise Ended(problem)
-        return replace(found, r_d=found.r + found.error, status=Status.SOLVED)
+        return replace(step, r_d=step.r + step.error, status=Status.SOLVED)
 
     def there_and_back(self, samples: list[Step], times: Array, length: float, ended: str) -> SelfMotion:
         """The way there and the same way back: q at mirrored times, the inputs negated."""

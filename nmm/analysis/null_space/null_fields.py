@@ -153,9 +153,9 @@ def follow(
         least = math.sqrt(squares[which[field.rank - 1]])
         if least < NEARLY_SINGULAR * math.sqrt(squares[which[0]]):
             return NEARLY
-    found = write_direction(J, field, last, along)
-    if found != FOLLOWED:
-        return found
+    outcome = write_direction(J, field, last, along)
+    if outcome != FOLLOWED:
+        return outcome
     error, u = e.task.error, e.answer.u
     for i in range(s):
         error[i] -= e0[i]
@@ -203,14 +203,14 @@ def expect_direction(
 
 
 def null_field(robot: Robot, J: Array, nearby: Array, rank: int, direction: Direction) -> Field:
-    """The field of a direction that `expect_direction` accepts, J (k, s, m) being known at some q nearby."""
+    """The field of a direction that `expect_direction` accepts; `nearby` is J (k, s, m) at some q nearby."""
     chosen = expect_direction(robot, J, rank, direction)
     if not isinstance(chosen, int):
         return _of_wish(chosen, rank)
     p = robot.platform.p
     start = readable_null_space(J, rank, [1] * p + [0] * (robot.n_u - p))[chosen]
     columns = np.flatnonzero(start)
-    smallest = [np.linalg.svd(one[:, columns])[2][-1] @ one[:, columns].T for one in nearby]
+    smallest = [np.linalg.svd(J_near[:, columns])[2][-1] @ J_near[:, columns].T for J_near in nearby]
     if np.abs(smallest).max(initial=0.0) > DEPENDENT:
         return _of_wish(start, rank)  # these inputs depend on each other at q and not beside it
     return Field(columns, start[columns], rank, 1)
@@ -224,10 +224,10 @@ def _of_wish(wish: Array, rank: int) -> Field:
 def direction_at(J: Array, field: Field) -> Array:
     """The unit null vector (m,) of J (s, m) with which a field begins; `Ended` where it cannot."""
     along = np.zeros(J.shape[1])
-    given = np.ascontiguousarray(J, dtype=np.float64), field, np.zeros_like(along), along
-    found = checked_by_caller(write_direction, DIRECTION)(*given)
-    if found != FOLLOWED:
-        raise Ended(WORDS[found])
+    arguments = np.ascontiguousarray(J, dtype=np.float64), field, np.zeros_like(along), along
+    outcome = checked_by_caller(write_direction, DIRECTION)(*arguments)
+    if outcome != FOLLOWED:
+        raise Ended(WORDS[outcome])
     return along
 
 
@@ -253,8 +253,8 @@ NEW = 1e-3
 MOST_SETS = 20_000
 
 
-def readable_null_space(J: Array, rank: int, costs: Sequence[int], given: Array | None = None) -> Array:
-    """The sparsest basis (m - rank - rank of given, m) that completes `given` (k, m) to null J (s, m).
+def readable_null_space(J: Array, rank: int, costs: Sequence[int], known: Array | None = None) -> Array:
+    """The sparsest basis (m - rank - rank of known, m) that completes `known` (k, m) to null J (s, m).
 
     Its vectors are circuits: minimal dependent sets of columns, so at most rank + 1 components differ from 0.
     The smallest independent circuits are taken first, of these those of least cost (m,), then of best
@@ -262,7 +262,7 @@ def readable_null_space(J: Array, rank: int, costs: Sequence[int], given: Array 
     each vector is 1. Beyond MOST_SETS sets, the reduced row echelon form's basis is used instead.
     """
     m = J.shape[1]
-    own = np.zeros((0, m)) if given is None else given
+    own = np.zeros((0, m)) if known is None else known
     count = m - rank - len(own)
     if count <= 0:
         return np.zeros((0, m))
@@ -273,8 +273,8 @@ def readable_null_space(J: Array, rank: int, costs: Sequence[int], given: Array 
     chosen = _new_ones(candidates, own, count)
     if len(chosen) < count:  # circuits that all but repeat each other
         chosen += _new_ones(_echelon(core, costs), np.vstack([own, *chosen]), count - len(chosen))
-    for one in chosen:  # the largest component 1: of equals the first, whatever the rounding
-        one /= one[np.argmax(np.round(np.abs(one) / np.abs(one).max(), 9))]
+    for circuit in chosen:  # the largest component 1: of equals the first, whatever the rounding
+        circuit /= circuit[np.argmax(np.round(np.abs(circuit) / np.abs(circuit).max(), 9))]
     return np.array(chosen).reshape(-1, m)
 
 
@@ -282,7 +282,7 @@ def _circuits(core: Array, costs: Sequence[int]) -> list[Array]:
     """All circuits of the columns of `core` (rank, m) as unit vectors, the most readable first."""
     rank, m = core.shape
     largest = float(np.linalg.norm(core, 2)) if core.size else 0.0
-    found: list[tuple[tuple[float, ...], Array]] = []
+    circuits: list[tuple[tuple[float, ...], Array]] = []
     for size in range(1, rank + 2):
         columns = np.array(list(itertools.combinations(range(m), size)), dtype=np.int64).reshape(-1, size)
         for own, null, gap in zip(columns, *_dependence(core, columns, largest), strict=True):
@@ -292,8 +292,8 @@ def _circuits(core: Array, costs: Sequence[int]) -> list[Array]:
             vector[own] = null
             # Condition in steps of a half decade: within one, cheaper columns and earlier ones win.
             condition = float(round(-2.0 * math.log10(gap))) if size > 1 else 0.0
-            found.append(((size, sum(costs[column] for column in own), condition), vector))
-    return [vector for _, vector in sorted(found, key=lambda item: item[0])]
+            circuits.append(((size, sum(costs[column] for column in own), condition), vector))
+    return [vector for _, vector in sorted(circuits, key=lambda item: item[0])]
 
 
 def _dependence(core: Array, columns: Integers, largest: float) -> tuple[Array, Array]:
@@ -319,14 +319,14 @@ def _echelon(core: Array, costs: Sequence[int]) -> list[Array]:
     weights = 1.0 + 1e-3 * np.asarray(costs, dtype=np.float64)
     pivots = qr(core * weights, mode="r", pivoting=True)[1]
     basic, free = pivots[:rank], pivots[rank:]
-    found = []
+    basis = []
     for column in free:
         vector = np.zeros(m)
         vector[basic] = -np.linalg.solve(core[:, basic], core[:, column])
         vector[column] = 1.0
         vector[np.abs(vector) <= TIGHT * np.abs(vector).max()] = 0.0
-        found.append(vector / np.linalg.norm(vector))
-    return sorted(found, key=lambda vector: int(np.count_nonzero(vector)))
+        basis.append(vector / np.linalg.norm(vector))
+    return sorted(basis, key=lambda vector: int(np.count_nonzero(vector)))
 
 
 def _new_ones(candidates: Sequence[Array], own: Array, count: int) -> list[Array]:

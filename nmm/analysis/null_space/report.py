@@ -36,7 +36,7 @@ def withheld_motions(
 ) -> tuple[Array, tuple[str, ...]]:
     """Self-motions (k, n), with sentences, that complete the rows of `admitted` to null F.
 
-    Sought along the platform's own axes, where few coordinates suffice, and with mimic joints.
+    They are searched in the platform's own axes, where few coordinates suffice, and with mimic joints.
     """
     n_p, who = robot.platform.n_p, robot.following
     to_world = np.eye(robot.n_independent)
@@ -44,12 +44,12 @@ def withheld_motions(
         c, s = np.cos(q[2]), np.sin(q[2])
         to_world[:2, :2] = [[c, -s], [s, c]]
     costs = [1] * n_p + [0] * (robot.n_independent - n_p)
-    given = admitted[:, who.independent] @ to_world
-    own = readable_null_space(F @ who.carried @ to_world, rank_F, costs, given)
+    known = admitted[:, who.independent] @ to_world
+    own = readable_null_space(F @ who.carried @ to_world, rank_F, costs, known)
     words = coordinate_words(robot, q)
     names = [robot.q_names[i] for i in who.independent]
     units = [f"{robot.q_units[i]}/s" for i in who.independent]
-    texts = tuple(motion_text(one, names, units, words, n_p) for one in own)
+    texts = tuple(motion_text(vector, names, units, words, n_p) for vector in own)
     return own @ to_world.T @ who.carried.T, texts
 
 
@@ -69,13 +69,13 @@ def regained_by_brackets(jacobians: Jacobians, t: float, q: Array, rank: int) ->
         return np.asarray(jacobians.robot.S(at) @ (N.T @ N) @ c)
 
     try:
-        here = fields(q)
-        along = [(fields(q + STEP * X) - fields(q - STEP * X)) / (2.0 * STEP) for X in here.T]
+        at_q = fields(q)
+        along = [(fields(q + STEP * X) - fields(q - STEP * X)) / (2.0 * STEP) for X in at_q.T]
     except SingularError:
         return None
     brackets = [along[a][:, b] - along[b][:, a] for a in range(len(along)) for b in range(a)]
-    both = np.column_stack([here, *brackets])
-    return rank_of(both, BRACKET_TOLERANCE) - here.shape[1]
+    both = np.column_stack([at_q, *brackets])
+    return rank_of(both, BRACKET_TOLERANCE) - at_q.shape[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +149,7 @@ class RedundancyReport:
     @property
     def withheld_coordinates(self) -> tuple[str, ...]:
         """`withheld` in the coordinates' names: "0.3 x + y"."""
-        return tuple(direction_text(one, self.robot.q_names) for one in self.withheld)
+        return tuple(direction_text(vector, self.robot.q_names) for vector in self.withheld)
 
     def text(self) -> str:
         """The report for people."""
@@ -161,7 +161,7 @@ class RedundancyReport:
 
     def _counts(self) -> list[Finding]:
         robot, s, n = self.robot, len(self.rows), self.robot.n_independent
-        found = [
+        findings = [
             Finding("redundancy_of", {"robot": robot.name, "rows": self.rows}),
             Finding("redundancy_sizes", {"n": n, "following": robot.n - n, "inputs": robot.n_u, "rows": s}),
             Finding("static_redundancy", {"n": n, "rows": s, "degree": self.static}),
@@ -171,33 +171,33 @@ class RedundancyReport:
             Finding("motions_free", {"rank": self.rank_J, "rows": s, "count": self.free}),
         ]
         if self.rank_J < self.rank_F:
-            found.append(Finding("singular_inputs", {"lost": self.rank_F - self.rank_J}))
-        return found
+            findings.append(Finding("singular_inputs", {"lost": self.rank_F - self.rank_J}))
+        return findings
 
     def _motions(self) -> list[Finding]:
         if not self.free:
             return []
-        found = [Finding("self_motions", {"count": self.free})]
+        findings = [Finding("self_motions", {"count": self.free})]
         for k, (vector, text) in enumerate(zip(self.readable, self.texts, strict=True)):
             moved = [name for name, rate in zip(self.robot.u_names, vector, strict=True) if rate]
             values = {"number": k, "motion": text, "alone": len(moved) == 1}
             everywhere = moved[0] in self.without_effect
-            found.append(Finding("self_motion", {**values, "everywhere": everywhere}))
-        return [*found, Finding("self_motions_combined", {"count": self.free})]
+            findings.append(Finding("self_motion", {**values, "everywhere": everywhere}))
+        return [*findings, Finding("self_motions_combined", {"count": self.free})]
 
     def _withheld(self) -> list[Finding]:
         k = len(self.withheld)
         if not k:
             same = self.robot.n_independent == self.robot.n_u
             return [] if same else [Finding("nothing_withheld")]
-        found = [Finding("motions_withheld", {"dimension": self.manifold, "count": k})]
+        findings = [Finding("motions_withheld", {"dimension": self.manifold, "count": k})]
         for text, coordinates in zip(self.withheld_texts, self.withheld_coordinates, strict=True):
-            found.append(Finding("motion_withheld", {"motion": text, "coordinates": coordinates}))
+            findings.append(Finding("motion_withheld", {"motion": text, "coordinates": coordinates}))
         if self.free < 2:
-            found.append(Finding("no_manoeuvre", {"free": self.free, "withheld": k}))
+            findings.append(Finding("no_manoeuvre", {"free": self.free, "withheld": k}))
         elif self.by_brackets is not None:
-            found.append(Finding("manoeuvres", {"given": self.by_brackets, "withheld": k}))
-        return found
+            findings.append(Finding("manoeuvres", {"given": self.by_brackets, "withheld": k}))
+        return findings
 
 
 def redundancy(
@@ -246,7 +246,7 @@ def redundancy(
         rank_J=rank_J,
         null=null_space(J, rank_J),
         readable=readable,
-        texts=tuple(motion_text(one, robot.u_names, robot.u_units, words, p) for one in readable),
+        texts=tuple(motion_text(vector, robot.u_names, robot.u_units, words, p) for vector in readable),
         without_effect=inputs_without_effect(controller.solver, q),
         withheld=withheld,
         withheld_texts=texts,
@@ -259,8 +259,8 @@ def coordinate_jacobian(jacobians: Jacobians, t: float, q: Array) -> Array:
     each = [(task.function, task.reference, Comparison(task)) for task in jacobians.task]
     program = Program(jacobians.robot, list(itertools.chain(*each)))
     program.lay_out()
-    found = program.evaluate(t, q)
-    triples = zip(found[::3], found[1::3], found[2::3], strict=True)
+    evaluated = program.evaluate(t, q)
+    triples = zip(evaluated[::3], evaluated[1::3], evaluated[2::3], strict=True)
     F = np.vstack([-e.value_q if len(e.value) else f.value_q - g.value_q for f, g, e in triples])
     if not np.all(np.isfinite(F)):
         raise SingularError(f"at t = {t:g} s: the task or its reference is undefined there")
