@@ -75,7 +75,7 @@ class Dip:
 def crossings(t: Array, values: Array, names: tuple[tuple[str, ...], ...]) -> tuple[Crossing, ...]:
     """Changes of sign in the columns of values (N, count), zeros skipped: interpolated linearly between
     neighbouring samples, or the middle of the zeros between two samples."""
-    found = []
+    zero_crossings = []
     for column, name in zip(values.T, names, strict=True):
         signed = np.flatnonzero(column)
         changes = np.flatnonzero(np.sign(column[signed[1:]]) != np.sign(column[signed[:-1]]))
@@ -86,8 +86,8 @@ def crossings(t: Array, values: Array, names: tuple[tuple[str, ...], ...]) -> tu
                 time = t[before] + share * (t[after] - t[before])
             else:
                 time = (t[before + 1] + t[after - 1]) / 2.0
-            found.append(Crossing(float(time), name, int(np.sign(column[after])), before, after))
-    return tuple(sorted(found, key=lambda crossing: crossing.t))
+            zero_crossings.append(Crossing(float(time), name, int(np.sign(column[after])), before, after))
+    return tuple(sorted(zero_crossings, key=lambda crossing: crossing.t))
 
 
 def dips(t: Array, values: Array, threshold: float, value_at: Callable[[float], float]) -> tuple[Dip, ...]:
@@ -96,7 +96,7 @@ def dips(t: Array, values: Array, threshold: float, value_at: Callable[[float], 
     singularity passed between two samples."""
     from scipy.optimize import minimize_scalar  # a tenth of a second that other analyses need not spend
 
-    found = []
+    lows = []
     for index in _minima(values, RISE * threshold):
         first, last = max(index - 1, 0), min(index + 1, len(t) - 1)
         time, value = float(t[index]), float(values[index])
@@ -112,28 +112,28 @@ def dips(t: Array, values: Array, threshold: float, value_at: Callable[[float], 
                 if refined.fun < value - LOWER * threshold:
                     time, value = float(refined.x), float(refined.fun)
         if value < threshold:
-            found.append(Dip(time, value, index, time in (t[0], t[-1])))
-    return tuple(found)
+            lows.append(Dip(time, value, index, time in (t[0], t[-1])))
+    return tuple(lows)
 
 
 def _minima(values: Array, rise: float) -> list[int]:
     """Samples of local minima between which the values rise by `rise` or more, ends included."""
-    found: list[int] = []
+    minima: list[int] = []
     lowest, highest, falling = 0, 0, True
     for k in range(len(values)):
         if falling:
             if values[k] < values[lowest]:
                 lowest = k
             elif values[k] >= values[lowest] + rise:
-                found.append(lowest)
+                minima.append(lowest)
                 highest, falling = k, False
         elif values[k] > values[highest]:
             highest = k
         elif values[k] <= values[highest] - rise:
             lowest, falling = k, True
     if falling:
-        found.append(lowest)
-    return found
+        minima.append(lowest)
+    return minima
 
 
 #: Most numbers that the minors of a motion may take.
@@ -244,7 +244,7 @@ def analyse_along(
     rank = ranks(values, values[:, 0], tolerance, jacobians.natural(row_sizes))
     sigma = {name: singular_values((J * scale)[..., own])[:, -1] for name, own in groups(robot).items()}
     low = LOW * float(values.max()) if threshold is None else positive(threshold, "threshold")
-    found = Minors(columns, determinants(J, columns), robot.u_names)
+    all_minors = Minors(columns, determinants(J, columns), robot.u_names)
     whole = volume(J)[:, np.newaxis]
 
     def sigma_at(time: float) -> float:
@@ -253,14 +253,14 @@ def analyse_along(
     extended_scale = input_sizes / np.concatenate([row_sizes, added_sizes])[:, np.newaxis]
 
     def extended_at(time: float) -> float:
-        here = interpolated(time, t, q)
-        rows = np.vstack([jacobians.J(time, here), jacobians.added_J(time, here)])
+        point = interpolated(time, t, q)
+        rows = np.vstack([jacobians.J(time, point), jacobians.added_J(time, point)])
         return float(singular_values(rows * extended_scale)[-1])
 
     extended = None
     if added_J.size:
         extended = singular_values(np.concatenate([J, added_J], axis=1) * extended_scale)[:, -1]
-    sizes_of_minors = np.abs(found.array)
+    sizes_of_minors = np.abs(all_minors.array)
     significant = sizes_of_minors > ROUNDING * hadamard_bounds(J, columns)
     return SingularityHistory(
         t=t,
@@ -272,10 +272,10 @@ def analyse_along(
         rank=rank,
         condition=condition_numbers(values, rank),
         sigma_min={**sigma, WHOLE: values[:, -1]},
-        minors=found,
-        ratios=np.divide(sizes_of_minors, whole, out=np.zeros_like(found.array), where=whole > 0.0),
+        minors=all_minors,
+        ratios=np.divide(sizes_of_minors, whole, out=np.zeros_like(all_minors.array), where=whole > 0.0),
         extended_sigma_min=extended,
-        crossings=crossings(t, np.where(significant, found.array, 0.0), found.names),
+        crossings=crossings(t, np.where(significant, all_minors.array, 0.0), all_minors.names),
         dips=dips(t, values[:, -1], low, sigma_at),
         extended_dips=() if extended is None else dips(t, extended, low, extended_at),
         threshold=low,

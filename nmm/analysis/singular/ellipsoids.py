@@ -206,10 +206,10 @@ def input_sizes(robot: Robot, sizes: Sizes, columns: list[int]) -> Array:
             problem = f"{robot.name} has no limits of {', '.join(free)}; give their sizes"
             raise InputError(problem, where="sizes")
         return limits
-    found = np.ones(robot.n_u)
+    all_sizes = np.ones(robot.n_u)
     for name, value in (sizes or {}).items():
-        found[robot.input(name)] = positive(value, f"size of {name}")
-    return found[columns]
+        all_sizes[robot.input(name)] = positive(value, f"size of {name}")
+    return all_sizes[columns]
 
 
 def _points(robot: Robot, q: ArrayLike | Mapping[str, float]) -> Array:
@@ -304,7 +304,7 @@ def drawn_scale(
 
 def largest_radius(ellipsoids: Sequence[Mapping[str, Ellipsoids]]) -> float:
     """The largest radius of all, m/s; 0 where nothing moves."""
-    radii = [one.radii[np.isfinite(one.radii)] for parts in ellipsoids for one in parts.values()]
+    radii = [part.radii[np.isfinite(part.radii)] for parts in ellipsoids for part in parts.values()]
     return max((float(known.max(initial=0.0)) for known in radii), default=0.0)
 
 

@@ -58,16 +58,16 @@ class Reached(Function):
         return (*self.function.stages(robot), Stage(stand_still, len(self.rows(robot))))
 
 
-def stacked(given: Tasks) -> Stack:
-    """Tasks as they are, functions with the target just reached; `InputError` for anything else."""
-    if isinstance(given, Stack):
-        return given
-    items = [given] if isinstance(given, Task | Function) else given
+def stacked(tasks: Tasks) -> Stack:
+    """A stack of the tasks, of functions with the target just reached; `InputError` for anything else."""
+    if isinstance(tasks, Stack):
+        return tasks
+    items = [tasks] if isinstance(tasks, Task | Function) else tasks
     if not isinstance(items, Sequence) or not all(isinstance(item, Task | Function) for item in items):
         raise InputError(
             where="task",
             expected="a task, a function of the robot as Position('ee'), or a list of these",
-            got=given,
+            got=tasks,
         )
     return Stack(tuple(item if isinstance(item, Task) else Task(item, Reached(item)) for item in items))
 
@@ -77,8 +77,8 @@ AT_ONCE = 128
 
 
 @compiled_without_gil
-def write_matrices(t: Array, q: Array, integers: Integers, floats: Array, found: Array) -> None:
-    """Write to found (N, s, m) the equation's matrix at t (N,) and q (N, n); NaN where any entry is."""
+def write_matrices(t: Array, q: Array, integers: Integers, floats: Array, J_at: Array) -> None:
+    """Write to J_at (N, s, m) the equation's matrix at t (N,) and q (N, n); NaN where any entry is."""
     e = views(ControlStep, integers, floats, BESIDE)
     b = views(LaidOut, integers, floats, 0).buffers
     J, n = e.problem.J, q.shape[1]
@@ -91,14 +91,14 @@ def write_matrices(t: Array, q: Array, integers: Integers, floats: Array, found:
                 finite = finite and math.isfinite(J[i, j])
         for i in range(J.shape[0]):
             for j in range(J.shape[1]):
-                found[k, i, j] = J[i, j] if finite else math.nan
+                J_at[k, i, j] = J[i, j] if finite else math.nan
 
 
 def matrices(controller: Controller, t: Array, q: Array, progress: Progress | None = None) -> Array:
     """J (N, s, m) of the controller's task at t (N,), s, and q (N, n), NaN where there is none: over the
     cores, or one by one if a Python function keeps the controller from being compiled as a whole."""
     q = np.ascontiguousarray(q, dtype=np.float64)
-    found = np.empty((len(q), len(controller.rows), controller.robot.n_u))
+    J_at = np.empty((len(q), len(controller.rows), controller.robot.n_u))
     if controller.solver.compiles_steps:
         with controller.solver.compiled() as (integers, floats):
             integers, floats = integers.copy(), floats.copy()
@@ -106,19 +106,19 @@ def matrices(controller: Controller, t: Array, q: Array, progress: Progress | No
         def worker() -> Work:
             own = floats.copy()
             return lambda first, last: write_matrices(
-                t[first:last], q[first:last], integers, own, found[first:last]
+                t[first:last], q[first:last], integers, own, J_at[first:last]
             )
 
         over_cores(len(q), AT_ONCE, worker, progress)
-        return found
+        return J_at
     solve, J, every = controller.solver.solve, controller.solver.derivatives[0], max(1, len(q) // 100)
     for k, point in enumerate(q):
         if progress is not None and k % every == 0:
             progress(k / len(q))
         solve(float(t[k]), point)
-        found[k] = J
-    found[~np.isfinite(found).all(axis=(1, 2))] = np.nan
-    return found
+        J_at[k] = J
+    J_at[~np.isfinite(J_at).all(axis=(1, 2))] = np.nan
+    return J_at
 
 
 class Jacobians:
@@ -166,11 +166,11 @@ class Jacobians:
 
     def along(self, t: float, q: Array, directions: Array) -> Array:
         """dJ/dε at q + ε directions[:, j] and fixed t, (columns, s, m), by central differences."""
-        found = [
+        derivatives = [
             (self.J(t, q + STEP * direction) - self.J(t, q - STEP * direction)) / (2.0 * STEP)
             for direction in directions.T
         ]
-        return np.array(found).reshape(directions.shape[1], len(self.rows), self.robot.n_u)
+        return np.array(derivatives).reshape(directions.shape[1], len(self.rows), self.robot.n_u)
 
     def batch(self, q: Array, t: float = 0.0, progress: Progress | None = None) -> Array:
         """J (N, s, m) at q (N, n), mimic joints placed by their leaders, and one time, over the cores; NaN
@@ -191,27 +191,29 @@ class Jacobians:
 
     def _many(self, controller: Controller, t: Array, q: Array, progress: Progress | None = None) -> Array:
         """J (N, rows, m) of a controller at t (N,) and q (N, n); NaN where there is none."""
-        found = matrices(controller, t, q, progress)
+        J = matrices(controller, t, q, progress)
         platform = self.robot.platform
         if type(platform).problem is not Platform.problem and len(q):
             places = q[:, : platform.n_p]
             if np.all(places == places[0]):  # it stands, as in maps of the workspace
                 places = places[:1]
             stuck = [platform.problem(place) is not None for place in places]
-            found[np.broadcast_to(stuck, len(q))] = np.nan
-        return found
+            J[np.broadcast_to(stuck, len(q))] = np.nan
+        return J
 
     def sizes(self, length: float | None, sizes: Mapping[str, float] | None) -> tuple[Array, Array, Array]:
         """How much of each row (s,), added row (k,) and input (m,) counts as 1, in their own units."""
         L = 1.0 if length is None else positive(length, "length")
-        given = {} if sizes is None else dict(sizes)
+        by_name = {} if sizes is None else dict(sizes)
         names = (*self.row_names, *(row.name for row in self.added_rows), *self.robot.u_names)
-        for name, value in given.items():
+        for name, value in by_name.items():
             expect_known("row or input", name, names, "sizes")
-            given[name] = positive(value, f"size of {name}")
+            by_name[name] = positive(value, f"size of {name}")
 
         def of(named: Iterable[tuple[str, str]]) -> Array:
-            return np.array([given.get(one, L if unit.split("/")[0] == "m" else 1.0) for one, unit in named])
+            return np.array(
+                [by_name.get(row, L if unit.split("/")[0] == "m" else 1.0) for row, unit in named]
+            )
 
         rows, added = (((row.name, row.unit) for row in rows) for rows in (self.rows, self.added_rows))
         return of(rows), of(added), of(zip(self.robot.u_names, self.robot.u_units, strict=True))

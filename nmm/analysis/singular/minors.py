@@ -120,25 +120,25 @@ def determinants(J: Array, columns: Integers) -> Array:
     """det J[:, columns] for each row of columns (count, s) and J (..., s, m): (..., count)."""
     s = J.shape[-2]
     flat = J.reshape(-1, s, J.shape[-1])
-    found = np.empty((len(flat), len(columns)))
+    minors = np.empty((len(flat), len(columns)))
     step = max(1, BLOCK // max(1, columns.size * s))
     for first in range(0, len(flat), step):
         block = flat[first : first + step][:, :, columns]  # (.., s, count, s)
-        found[first : first + step] = np.linalg.det(np.moveaxis(block, 1, 2))
-    return found.reshape(*J.shape[:-2], len(columns))
+        minors[first : first + step] = np.linalg.det(np.moveaxis(block, 1, 2))
+    return minors.reshape(*J.shape[:-2], len(columns))
 
 
 def determinant_rates(J: Array, J_u: Array, columns: Integers) -> Array:
     """Derivatives (k, count) of those determinants along k motions, from J_u (k, s, m)."""
     A = np.moveaxis(J[:, columns], 1, 0)
-    found = np.zeros((len(J_u), len(columns)))
+    rates = np.zeros((len(J_u), len(columns)))
     for k, derivative in enumerate(J_u):
         dA = np.moveaxis(derivative[:, columns], 1, 0)
         for c in range(J.shape[0]):
             replaced = A.copy()
             replaced[:, :, c] = dA[:, :, c]
-            found[k] += np.linalg.det(replaced)
-    return found
+            rates[k] += np.linalg.det(replaced)
+    return rates
 
 
 def hadamard_bounds(J: Array, columns: Integers) -> Array:

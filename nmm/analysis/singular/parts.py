@@ -154,10 +154,10 @@ class Part(Ranked):
 def singular_values(J: Array) -> Array:
     """The s singular values of J (..., s, m), falling; zeros if there are fewer columns than rows."""
     s, m = J.shape[-2:]
-    found = np.zeros((*J.shape[:-2], s))
+    values = np.zeros((*J.shape[:-2], s))
     if m:
-        found[..., : min(s, m)] = spectra(J.reshape(-1, s, m)).reshape(*J.shape[:-2], min(s, m))
-    return found
+        values[..., : min(s, m)] = spectra(J.reshape(-1, s, m)).reshape(*J.shape[:-2], min(s, m))
+    return values
 
 
 def some_columns(J: Array, columns: Sequence[int]) -> Array:
@@ -192,7 +192,7 @@ def condition_numbers(values: Array, rank: Integers) -> Array:
 
 def groups(robot: Robot) -> dict[str, list[int]]:
     """Columns of each part: "platform", "arm", the arms by name, "robot" last."""
-    columns = {name: [robot.input(one) for one in inputs] for name, inputs in robot.groups.items()}
+    columns = {part: [robot.input(name) for name in inputs] for part, inputs in robot.groups.items()}
     return {**columns, WHOLE: list(range(robot.n_u))}
 
 
