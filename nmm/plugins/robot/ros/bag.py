@@ -76,8 +76,8 @@ def read_bag(
     Examples
     --------
     >>> run = nmm.Scenario.load("unicycle_2r_position", {"duration": 0.5}).run()
-    >>> found = nmm.read_bag(run.save_mcap("run.mcap"), run.robot, frame="ee")
-    >>> bool(np.abs(found.q - run.q).max() < 1e-12)
+    >>> recorded = nmm.read_bag(run.save_mcap("run.mcap"), run.robot, frame="ee")
+    >>> bool(np.abs(recorded.q - run.q).max() < 1e-12)
     True
     """
     file = Path(path)
@@ -95,7 +95,7 @@ def read_bag(
     if frame is not None:
         place = np.array([Configuration(robot, at).placement(frame).translation for at in q])
     sizes = {"N": count, "n": robot.n, "m": robot.n_u}
-    arrays = {one.name: one.absent(**sizes) for one in saved() if not one.optional}
+    arrays = {quantity.name: quantity.absent(**sizes) for quantity in saved() if not quantity.optional}
     arrays |= {"t": t, "q": q, "u": u, "q_dot": q_dot, "path": place, "believed": motion.believed}
     for finding in motion.findings:
         warnings.warn(f"{file.name}: {finding}", RuntimeWarning, stacklevel=2)
@@ -128,11 +128,11 @@ class _Motion:
             self.findings += route.findings
         self.times = self._times(world)
         self.q, self.believed = self._configurations(world, counted)
-        for edge, told in {edge: told for route in both for edge, told in route.told_jumps().items()}.items():
-            at = (told.pop("ns") - self.times[0]) / 1e9
-            self.findings.append(Finding("pose_jumps", {"edge": edge.name, **told}, {"t": at}))
+        for edge, jump in {edge: jump for route in both for edge, jump in route.told_jumps().items()}.items():
+            at = (jump.pop("ns") - self.times[0]) / 1e9
+            self.findings.append(Finding("pose_jumps", {"edge": edge.name, **jump}, {"t": at}))
         self.u = self._inputs(world, counted)
-        self.findings = [*{str(one): one for one in self.findings}.values()]
+        self.findings = [*{str(finding): finding for finding in self.findings}.values()]
 
     def _times(self, world: Route | None) -> Integers:
         """When there are samples: where any joint's position comes, all are known, and the platform is."""
@@ -235,8 +235,8 @@ class _Motion:
         if len(twists) and not self._contradicts(route):
             return along(twists.between(self.times), self.q[:, 2])
         if len(twists):
-            told = f"the twist of {self.recorded.odometry_topic}"
-            contradicted.setdefault(not np.any(twists.rows), []).append(told)
+            source = f"the twist of {self.recorded.odometry_topic}"
+            contradicted.setdefault(not np.any(twists.rows), []).append(source)
         rates = by_differences(t, pose, route.breaks(self.times))
         return along(rates, self.q[:, 2] - pose[:, 2])
 

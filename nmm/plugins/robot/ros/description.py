@@ -48,13 +48,13 @@ def description(robot: Robot, links: Links) -> tuple[str, list[str]]:
 
 
 def packaged(robot: Robot) -> dict[str, tuple[str, str]]:
-    """By the files of meshes that lie where ROS_PACKAGE_PATH leads: its folder, and the package and place."""
-    found = {}
+    """Mesh files under ROS_PACKAGE_PATH, each with its folder there, and its package and path in that."""
+    places = {}
     for name, file in provenance_of(robot).meshes.items():
         inside = name.removeprefix(PACKAGE).lstrip("/")
         if name.startswith(PACKAGE) and str(file).endswith(f"/{inside}"):
-            found[str(file)] = str(file).removesuffix(f"/{inside}"), inside
-    return found
+            places[str(file)] = str(file).removesuffix(f"/{inside}"), inside
+    return places
 
 
 def _write_joint(root: Element, robot: Robot, link: Link, place: Array) -> None:
@@ -79,11 +79,11 @@ def _write_joint(root: Element, robot: Robot, link: Link, place: Array) -> None:
     limit = SubElement(joint, "limit", most)
     if not unlimited:
         limit.attrib |= {"lower": _number(ends[0]), "upper": _number(ends[1])}
-    for one in robot.mimic_joints:
-        if one.joint == link.joint:
-            one = one.reversed(robot.reversed_joints)
-            numbers = {"multiplier": _number(one.multiplier), "offset": _number(one.offset)}
-            SubElement(joint, "mimic", {"joint": one.leader, **numbers})
+    for mimic in robot.mimic_joints:
+        if mimic.joint == link.joint:
+            mimic = mimic.reversed(robot.reversed_joints)
+            numbers = {"multiplier": _number(mimic.multiplier), "offset": _number(mimic.offset)}
+            SubElement(joint, "mimic", {"joint": mimic.leader, **numbers})
 
 
 def _parts(

@@ -37,8 +37,8 @@ def difference(run: Trajectory, bag: Trajectory) -> Mapping[str, Any]:
     for i, name in enumerate(robot.q_names[min(3, n_p) :], min(3, n_p)):
         values[name] = off[:, i]
     if run.frame is not None:
-        there = _places(run, run.frame, moved) - _places(run, run.frame, planned)
-        values[run.frame] = np.asarray(np.linalg.norm(there, axis=1))
+        offset = _places(run, run.frame, moved) - _places(run, run.frame, planned)
+        values[run.frame] = np.asarray(np.linalg.norm(offset, axis=1))
     units = {"platform": "m", run.frame: "m"} | dict(zip(robot.q_names, robot.q_units, strict=True))
     return {
         "duration": float(t[-1]),
@@ -57,4 +57,4 @@ def difference(run: Trajectory, bag: Trajectory) -> Mapping[str, Any]:
 
 def _places(run: Trajectory, frame: str, q: Array) -> Array:
     """Where a frame is (N, 3) at q (N, n)."""
-    return np.array([Configuration(run.robot, one).placement(frame).translation for one in q])
+    return np.array([Configuration(run.robot, row).placement(frame).translation for row in q])

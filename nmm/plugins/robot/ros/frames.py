@@ -53,8 +53,8 @@ class Transforms:
     def add(self, message: Any) -> None:
         """Take over a TFMessage; `InputError` as of `placement`, with nothing taken over."""
         expect(hasattr(message, "transforms"), type(message).__name__, "a message with the field transforms")
-        newest = [(plain(one.child_frame_id), (plain(one.header.frame_id), placement(one)))
-                  for one in message.transforms]  # fmt: skip
+        newest = [(plain(transform.child_frame_id), (plain(transform.header.frame_id), placement(transform)))
+                  for transform in message.transforms]  # fmt: skip
         self.newest.update(newest)
 
     def placement(self, frame: str, child: str) -> Array:
@@ -76,11 +76,11 @@ class Transforms:
         if not isinstance(child, Robot):
             return planar(self.placement(frame, child), f"{child} in {frame}")
         fixed = fixed_frames(child)
-        known = [one for one in fixed if self.connects(frame, one)]
+        known = [name for name in fixed if self.connects(frame, name)]
         if not known:
             what = f"no transforms from {frame} to a link that is fixed to the platform of {child.name}"
             raise InputError(what, expected=f"one of {', '.join([*fixed][:4])}", available=self.frames)
-        nearest = min(known, key=lambda one: len(self._chain(one)))
+        nearest = min(known, key=lambda name: len(self._chain(name)))
         pose = self.placement(frame, nearest) @ np.linalg.inv(fixed[nearest])
         return planar(pose, f"{nearest} in {frame}")
 
@@ -164,11 +164,11 @@ class Tree:
         return sorted({name for pair in self.edges for name in pair})
 
     def add(self, message: Any, topic: str, static: bool, recorded: int) -> None:
-        """Take over a TFMessage."""
-        for one in message.transforms:
-            pair = plain(one.header.frame_id), plain(one.child_frame_id)
+        """Add the transforms of a TFMessage."""
+        for transform in message.transforms:
+            pair = plain(transform.header.frame_id), plain(transform.child_frame_id)
             edge = self.edges.setdefault(pair, Edge(*pair, static, topic))
-            edge.track.add(nanoseconds(one), recorded, placement(one))
+            edge.track.add(nanoseconds(transform), recorded, placement(transform))
 
     def way(self, frame: str, child: str) -> Way | None:
         """The fewest edges from one frame to another; None where there are none."""

@@ -103,12 +103,12 @@ class Links:
         return [(link.parent, link.name, *position_and_quaternion(self.placement(link))) for link in still]
 
     def moving(self, q: Array, wheels: Array) -> list[Transform]:
-        """Those of links on joints, at q (n,) and the wheels' angles (D,)."""
+        """Transforms of links on joints, at q (n,) and the wheels' angles (D,)."""
         relative = self._placements.relative(q, wheels)
-        found = (
+        placed = (
             (link, self.placement(link, relative[link.on - 1])) for link in self.links.values() if link.moves
         )
-        return [(link.parent, link.name, *position_and_quaternion(at)) for link, at in found]
+        return [(link.parent, link.name, *position_and_quaternion(at)) for link, at in placed]
 
 
 def _free(name: str, taken: set[str]) -> str:

@@ -94,7 +94,7 @@ def messages_of(trajectory: Trajectory, made: Messages) -> Iterator[Timed]:
         (world, name, *position_and_quaternion((ground * place).homogeneous)) for name, place in links.ground
     ]
     if still := [*links.fixed, *still]:
-        yield first, TF_STATIC, made.tf([(begin, *one) for one in still])
+        yield first, TF_STATIC, made.tf([(begin, *transform) for transform in still])
     for topic, points in ((PATH, run.path), (DESIRED, run.moving)):
         if points is not None and len(points):
             yield first, topic, made.path(begin, [ground.act(point) for point in points], world)
@@ -119,7 +119,7 @@ def messages_of(trajectory: Trajectory, made: Messages) -> Iterator[Timed]:
         if run.desired is not None and np.isfinite(run.desired[k]).all():
             wanted = pin.SE3(np.eye(3), ground.act(run.desired[k]))
             yield now, DESIRED_POSE, made.pose(t, wanted.homogeneous, world)
-        moved = [(t, *one) for one in links.moving(q, angles[k])]
+        moved = [(t, *transform) for transform in links.moving(q, angles[k])]
         frames = [(t, made.odom, made.base, *position_and_quaternion(stand))]
         if run.believed is not None:
             off = planar_matrix(q) @ np.linalg.inv(stand)

@@ -22,11 +22,11 @@ class Rclpy(Mapping[str, type]):
     def __getitem__(self, name: str) -> type:
         package, _, kind = name.split("/")
         try:
-            found: type = getattr(import_module(f"{package}.msg"), kind)
+            message_class: type = getattr(import_module(f"{package}.msg"), kind)
         except ImportError:
             what = f"{package} of ROS 2 is not on Python's path: source its setup file, or give types"
             raise InputError(what, where="nmm.ros.Messages") from None
-        return found
+        return message_class
 
     def __iter__(self) -> Iterator[str]:
         return iter(())
@@ -108,8 +108,8 @@ class Messages:
             spread[np.ix_([0, 1, 5], [0, 1, 5])] = matrix(covariance, (3, 3), "covariance")
         velocity = np.zeros(3) if q_dot is None else body_twist(q, vector(q_dot, self.robot.n, "q_dot"))
         pose = self._pose(*planar_pose(q[:3] if self._first else np.zeros(3)))
-        covariances = [self._floats(one.ravel()) for one in (spread, unknown)]
-        kinds = [f"geometry_msgs/msg/{one}WithCovariance" for one in ("Pose", "Twist")]
+        covariances = [self._floats(block.ravel()) for block in (spread, unknown)]
+        kinds = [f"geometry_msgs/msg/{name}WithCovariance" for name in ("Pose", "Twist")]
         return self._made(
             "nav_msgs/msg/Odometry",
             header=self._header(t, self.odom),
@@ -228,8 +228,8 @@ class Messages:
     def _twist(self, velocity: Array) -> Any:
         vx, vy, omega = velocity.tolist()
         linear, angular = (
-            self._made("geometry_msgs/msg/Vector3", **_xyz(np.array(one)))
-            for one in ([vx, vy, 0.0], [0.0, 0.0, omega])
+            self._made("geometry_msgs/msg/Vector3", **_xyz(np.array(xyz)))
+            for xyz in ([vx, vy, 0.0], [0.0, 0.0, omega])
         )
         return self._made("geometry_msgs/msg/Twist", linear=linear, angular=angular)
 

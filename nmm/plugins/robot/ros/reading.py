@@ -100,12 +100,12 @@ def placement(message: Any) -> Array:
     length = math.hypot(x, y, z, w)
     expect(abs(length - 1.0) <= UNIT, f"{where}: orientation", "a quaternion of length 1", length)
     x, y, z, w = x / length, y / length, z / length, w / length
-    found = np.eye(4)
-    found[:3, 0] = 1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)
-    found[:3, 1] = 2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)
-    found[:3, 2] = 2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)
-    found[:3, 3] = vector([at.x, at.y, at.z], 3, f"{where}: position")
-    return found
+    pose = np.eye(4)
+    pose[:3, 0] = 1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)
+    pose[:3, 1] = 2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)
+    pose[:3, 2] = 2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)
+    pose[:3, 3] = vector([at.x, at.y, at.z], 3, f"{where}: position")
+    return pose
 
 
 def base(message: Any, frame: str | None = None, child: str | None = None) -> Array:
@@ -131,9 +131,9 @@ def base(message: Any, frame: str | None = None, child: str | None = None) -> Ar
     nmm.base.errors.InputError: SimpleNamespace: header.frame_id: expected 'map', got 'odom'
     """
     where, header = name_of(message), getattr(message, "header", None)
-    given, about = getattr(header, "frame_id", None), getattr(message, "child_frame_id", None)
-    if frame is not None and given is not None:
-        expect(plain(given) == plain(frame), f"{where}: header.frame_id", f"{frame!r}", given)
+    frame_id, about = getattr(header, "frame_id", None), getattr(message, "child_frame_id", None)
+    if frame is not None and frame_id is not None:
+        expect(plain(frame_id) == plain(frame), f"{where}: header.frame_id", f"{frame!r}", frame_id)
     if child is not None and about is not None:
         expect(plain(about) == plain(child), f"{where}: child_frame_id", f"{child!r}", about)
     return planar(placement(message), where)
@@ -210,8 +210,8 @@ def inputs(robot: Robot, q: ArrayLike, velocity: ArrayLike, joint_rates: Mapping
         vx, vy, omega = vector(velocity, 3, "velocity")
         c, s = math.cos(at[2]), math.sin(at[2])
         q_dot[:3] = c * vx - s * vy, s * vx + c * vy, omega
-    found = np.linalg.lstsq(robot.S(at)[known], vector(q_dot, robot.n, "joint_rates")[known], rcond=None)[0]
-    return np.asarray(found)
+    u = np.linalg.lstsq(robot.S(at)[known], vector(q_dot, robot.n, "joint_rates")[known], rcond=None)[0]
+    return np.asarray(u)
 
 
 def joint_trajectory(message: Any) -> tuple[Array, dict[str, Array]]:
@@ -233,11 +233,11 @@ def joint_trajectory(message: Any) -> tuple[Array, dict[str, Array]]:
     where, names, points = name_of(message), [*message.joint_names], [*message.points]
     expect(points, where, "at least one point")
     expect(len({*names}) == len(names), f"{where}: joint_names", "each joint once", names)
-    times = np.array([nanoseconds(one.time_from_start) / 1e9 for one in points])
+    times = np.array([nanoseconds(point.time_from_start) / 1e9 for point in points])
     increasing(times, f"{where}: time_from_start")
     rows = [
-        vector(np.asarray(one.positions), len(names), f"{where}: points.{i}.positions")
-        for i, one in enumerate(points)
+        vector(np.asarray(point.positions), len(names), f"{where}: points.{i}.positions")
+        for i, point in enumerate(points)
     ]
     return times, dict(zip(names, np.array(rows).T, strict=True))
 
@@ -257,8 +257,8 @@ def _by_name(message: Any, part: str) -> dict[str, float]:
 def _field(message: Any, name: str) -> Sequence[Any]:
     if not hasattr(message, name):
         raise InputError(where=name_of(message), expected=f"a message with the field {name}")
-    found: Sequence[Any] = getattr(message, name)
-    return found
+    values: Sequence[Any] = getattr(message, name)
+    return values
 
 
 def name_of(message: Any) -> str:

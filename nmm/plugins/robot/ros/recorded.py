@@ -95,11 +95,11 @@ class Recorded:
         yield self.names.topic("inputs"), self.inputs
 
     def _takes(self, topics: list[Topic]) -> dict[Topic, Callable[[str, int, Any], None]]:
-        """Who takes the messages of which topics; `InputError` for a robot's that the log lacks."""
+        """The method that takes each topic's messages; `InputError` for a topic that the log lacks."""
         names = self.names
-        there = {topic for topic, _ in topics}
+        present = {topic for topic, _ in topics}
         tf, static = (
-            own if (own := names.topic(name)) in there else f"/{name.lstrip('/')}"  # that of all robots
+            own if (own := names.topic(name)) in present else f"/{name.lstrip('/')}"  # that of all robots
             for name in (names.tf, f"{names.tf}_static")
         )
         joints = [names.topic(name) for name in names.joints]
@@ -123,9 +123,9 @@ class Recorded:
                            {ODOMETRY, *TRANSFORMS}))  # fmt: skip
         for what, some in needed:
             if not some & kinds:
-                near = sorted(topics, key=lambda one: one[1] not in some)
-                told = [f"{topic} ({kind})" for topic, kind in near]
-                raise InputError(expected=f"a topic of {what}", available=told)
+                near = sorted(topics, key=lambda topic: topic[1] not in some)
+                available = [f"{topic} ({kind})" for topic, kind in near]
+                raise InputError(expected=f"a topic of {what}", available=available)
         return takes
 
     def _take_joints(self, _: str, recorded: int, message: Any) -> None:
@@ -163,9 +163,9 @@ class Recorded:
         if not several:
             return None
         if len(several) > 1:
-            told = [f"{child} in {frame}" for frame, child in several]
+            available = [f"{child} in {frame}" for frame, child in several]
             raise InputError("odometry of several frames on one topic", where=self.odometry_topic,
-                             expected="prefix=, or another topic", available=told)  # fmt: skip
+                             expected="prefix=, or another topic", available=available)  # fmt: skip
         ((edge, twists),) = several.values()
         pose = np.eye(4)
         if edge.child:

@@ -59,19 +59,19 @@ class Route:
 
     def told_jumps(self) -> dict[Edge, dict[str, float]]:
         """Of the edges that jump: how often, by how much at most (m, rad), and when first (ns)."""
-        told = {}
+        jumps = {}
         for edge, flags in self._jumps.items():
             if flags.any():
                 times, poses = edge.poses
                 steps = np.abs(steps_of(times, poses)[1][flags])
                 far = np.hypot(steps[:, 0], steps[:, 1])
-                told[edge] = {
+                jumps[edge] = {
                     "count": int(flags.sum()),
                     "m": float(far.max()),
                     "rad": float(steps[:, 2].max()),
                     "ns": int(times[1:][flags][0]),
                 }
-        return told
+        return jumps
 
     def breaks(self, times: Integers) -> Flags:
         """Between which of the times, ns, it jumps, (N - 1,)."""
@@ -94,11 +94,13 @@ class Route:
 
 
 def routes(recorded: Recorded) -> tuple[Route, Route | None]:
-    """To where the platform is in the map, or by odometry where the log has no map, and in the first case to
-    where odometry has it, if it does; `InputError` where there is none."""
+    """The route to the platform in the map, and that in odometry's frame or None; the latter alone where the
+    log has no map. `InputError` where there is neither."""
     names, tree, edge = recorded.names, recorded.tree, recorded.odometry
     frames = tree.frames
-    world, odom = (prefixed(one, recorded.prefix, frames, (names.map,)) for one in (names.map, names.odom))
+    world, odom = (
+        prefixed(frame, recorded.prefix, frames, (names.map,)) for frame in (names.map, names.odom)
+    )
     mapped = counted = None
     fixed, base = fixed_frames(recorded.robot), names.base
     known = {*frames, *fixed, *([] if edge is None else [edge.child])}
@@ -125,8 +127,8 @@ def routes(recorded: Recorded) -> tuple[Route, Route | None]:
         for step, back in route.way:
             below = step.parent if back else step.child
             if len(parents := tree.parents(below)) > 1:
-                told = {"frame": below, "parents": " and ".join(parents), "edge": step.name}
-                route.findings.append(Finding("parents_differ", told))
+                values = {"frame": below, "parents": " and ".join(parents), "edge": step.name}
+                route.findings.append(Finding("parents_differ", values))
     return both[0], counted if mapped is not None else None
 
 
@@ -145,7 +147,7 @@ def _to_base(recorded: Recorded, frame: str) -> tuple[Way, Array] | None:
     ways = [(way, end) for end in ends if (way := tree.way(frame, end)) is not None]
     if not ways:
         return None
-    way, end = min(ways, key=lambda one: len(one[0]))
+    way, end = min(ways, key=lambda pair: len(pair[0]))
     return way, _tail_of(recorded, end)
 
 

@@ -54,7 +54,7 @@ class Log:
 
     def _opened(self, path: Path) -> list[_Indexed | _Streamed]:
         inside = sorted(path.iterdir(), key=_counted) if path.is_dir() else []
-        files = [one for one in inside if one.suffix in (".bag", ".mcap", ".db3")]
+        files = [file for file in inside if file.suffix in (".bag", ".mcap", ".db3")]
         whole = not path.is_dir() or (path / "metadata.yaml").exists()
         try:
             if whole:
@@ -92,11 +92,15 @@ class _Indexed:
         self._reader: Callable[[Path], Any] = rosbags("rosbag1" if first else "rosbag2").Reader
         self._decoded = of_ros1() if first else typestore().deserialize_cdr
         with self._reader(path) as bag:
-            self.topics = [(one.topic, one.msgtype) for one in bag.connections]
+            self.topics = [(connection.topic, connection.msgtype) for connection in bag.connections]
 
     def messages(self, wanted: Collection[Topic]) -> Iterator[Taken]:
         with self._reader(self.path) as bag:
-            some = [one for one in bag.connections if (one.topic, one.msgtype) in wanted]
+            some = [
+                connection
+                for connection in bag.connections
+                if (connection.topic, connection.msgtype) in wanted
+            ]
             for connection, time, data in bag.messages(connections=some) if some else ():
                 yield connection.topic, time, self._decoded(data, connection.msgtype)
 

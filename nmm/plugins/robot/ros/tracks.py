@@ -43,16 +43,16 @@ class Track:
 
     def sorted(self) -> tuple[Integers, Array]:
         """Times (N,), ns, that increase, and rows (N, ...); of equal times the last."""
-        given = self.recorded if self.by_recording else self.stamps
-        latest = dict(zip(given, self.rows, strict=True))
+        stamps = self.recorded if self.by_recording else self.stamps
+        latest = dict(zip(stamps, self.rows, strict=True))
         times = np.array(sorted(latest), dtype=np.int64)
         return times, np.array([latest[time] for time in times.tolist()])
 
     def between(self, times: Integers) -> Array:
         """Rows (N, k) at times, ns, linear in between."""
-        given, rows = self.sorted()
-        start = given[0]
-        return interpolated((times - start) / 1e9, (given - start) / 1e9, rows)
+        stamps, rows = self.sorted()
+        start = stamps[0]
+        return interpolated((times - start) / 1e9, (stamps - start) / 1e9, rows)
 
     def without(self, some: Flags) -> None:
         """Leave those messages out."""
@@ -62,15 +62,15 @@ class Track:
 
 
 def settle(tracks: Iterable[tuple[str, Track]]) -> list[Finding]:
-    """Let tracks (with the names of their topics) whose stamps are 0 or stand still go by the times of
-    recording; and those beside them, if they are stamped by another clock."""
-    given = [(name, track) for name, track in tracks if len(track)]
+    """Time tracks (each with its topic's name) by recording where their stamps are 0 or stand still, and then
+    also the others whose stamps are another clock's."""
+    filled = [(name, track) for name, track in tracks if len(track)]
     why: dict[tuple[str, str], None] = {}
-    for name, track in given:
+    for name, track in filled:
         if reason := _flaw(track):
             track.by_recording, why[reason, name] = True, None
     findings = [Finding("stamps_of_recording", {"topic": name, "why": reason}) for reason, name in why]
-    others = [(name, track) for name, track in given if not track.by_recording]
+    others = [(name, track) for name, track in filled if not track.by_recording]
     if why:
         for name, track in others:
             apart = np.median(np.subtract(track.recorded, track.stamps, dtype=np.float64))
@@ -78,14 +78,14 @@ def settle(tracks: Iterable[tuple[str, Track]]) -> list[Finding]:
                 track.by_recording = True
                 findings.append(Finding("stamps_of_recording", {"topic": name, "why": "another clock"}))
     lost: dict[str, int] = {}
-    for name, track in given:
+    for name, track in filled:
         stamps = np.array(track.stamps)
         rest = stamps[stamps > 0]
         if not track.by_recording and 0 < len(rest) < len(stamps) and rest.min() > np.ptp(rest) + ANOTHER:
             lost[name] = max(lost.get(name, 0), len(stamps) - len(rest))
             track.without(stamps <= 0)
     findings += [Finding("stamps_missing", {"topic": name, "count": count}) for name, count in lost.items()]
-    return [*{str(one): one for one in findings}.values()]
+    return [*{str(finding): finding for finding in findings}.values()]
 
 
 def _flaw(track: Track) -> str:
@@ -101,13 +101,13 @@ def _flaw(track: Track) -> str:
     return "standing" if many.any() or all_same else ""
 
 
-def poses_at(times: Integers, given: Integers, poses: Array, jumps: Flags) -> Array:
-    """Poses (N, 4, 4) at times, ns, of poses (M, 4, 4) at increasing times: in between along a straight line
-    and about one axis, but for the jumps (M - 1,), before which they stay."""
-    if len(given) == 1:
+def poses_at(times: Integers, stamps: Integers, poses: Array, jumps: Flags) -> Array:
+    """Poses (N, 4, 4) at times, ns, interpolated between poses (M, 4, 4) at increasing stamps, ns: along a
+    straight line and about one axis; across jumps (M - 1,) the earlier pose is held."""
+    if len(stamps) == 1:
         return np.repeat(poses, len(times), axis=0)
-    k = np.clip(np.searchsorted(given, times, side="right") - 1, 0, len(given) - 2)
-    share = np.clip((times - given[k]) / (given[k + 1] - given[k]), 0.0, 1.0)
+    k = np.clip(np.searchsorted(stamps, times, side="right") - 1, 0, len(stamps) - 2)
+    share = np.clip((times - stamps[k]) / (stamps[k + 1] - stamps[k]), 0.0, 1.0)
     share = np.where(jumps[k], np.floor(share), share)
     placed = poses[k]
     placed[:, :3, 3] += share[:, np.newaxis] * (poses[k + 1, :3, 3] - poses[k, :3, 3])
