@@ -123,13 +123,13 @@ class Platform(ABC):
             measured = self.measured(layout)
         except InputError as error:
             return (Finding("platform_misfit", {"platform": self.name, "reason": str(error)}),)
-        found = []
-        for name, given in self.lengths.items():
-            own = measured.get(name, given)
-            if abs(given - own) > max(CLOSE_LENGTH, CLOSE_SHARE * abs(own)):
-                values = {"platform": self.name, "name": name, "given": given, "measured": own}
-                found.append(Finding("platform_length_differs", values))
-        return tuple(found)
+        findings = []
+        for name, length in self.lengths.items():
+            own = measured.get(name, length)
+            if abs(length - own) > max(CLOSE_LENGTH, CLOSE_SHARE * abs(own)):
+                values = {"platform": self.name, "name": name, "given": length, "measured": own}
+                findings.append(Finding("platform_length_differs", values))
+        return tuple(findings)
 
     def added_joint(self, layout: Layout) -> AddedJoint | None:
         """A coordinate of its own that the file lacks, or limits of one that the file's others imply."""
@@ -220,7 +220,7 @@ class Platform(ABC):
         if self.n_p == self.p:
             return np.zeros((len(qp), 0))
         at_once = type(self).pfaffian in _of_many
-        A = self.pfaffian(qp) if at_once else np.array([self.pfaffian(one) for one in qp])
+        A = self.pfaffian(qp) if at_once else np.array([self.pfaffian(row) for row in qp])
         return np.einsum("kij,kj->ki", A.reshape(len(qp), -1, self.n_p), qp_dot)
 
     def velocity_maps(self, qp: Array) -> tuple[Array, Array]:

@@ -57,7 +57,7 @@ class Recognized:
 def with_roles(layout: Layout, steer: Collection[str] = ()) -> Layout:
     """The layout whose pivots have roles: those in `steer` steer, and others by what they carry."""
     return replace(
-        layout, pivots=tuple(replace(one, role=_role(layout, one, steer)) for one in layout.pivots)
+        layout, pivots=tuple(replace(pivot, role=_role(layout, pivot, steer)) for pivot in layout.pivots)
     )
 
 
@@ -73,7 +73,9 @@ def _role(layout: Layout, pivot: Pivot, steer: Collection[str]) -> Role:
         return "swivel" if wheels_on(layout, MAIN_BODY) or pivot.carrier != MAIN_BODY else "steering"
     centred = _is_centred(layout, pivot)
     if not wheels_on(layout, MAIN_BODY):  # casters beside what steers
-        others = [one for one in layout.pivots if wheels_on(layout, one.joint) and _is_centred(layout, one)]
+        others = [
+            other for other in layout.pivots if wheels_on(layout, other.joint) and _is_centred(layout, other)
+        ]
         return "steering" if centred or len(others) < 2 else "swivel"
     return "steering" if centred and pivot.upper - pivot.lower < _ENDLESS else "swivel"
 
@@ -167,7 +169,7 @@ def recognized(layout: Layout) -> Recognized:
             return _named("omnidirectional", "axes_meet", standing)
         raise _unclear(layout, "not_parallel")
     if any(pivot.hitches for pivot in layout.pivots) and _fits(layout, "tractor"):
-        return _named("tractor", "hitched", [one for one in layout.pivots if one.hitches])
+        return _named("tractor", "hitched", [pivot for pivot in layout.pivots if pivot.hitches])
     if steering:
         for kind in ("car", "wheeled"):
             if _fits(layout, kind):
@@ -239,7 +241,7 @@ def _unclear(layout: Layout, why: str) -> InputError:
 def _commands(layout: Layout) -> Iterator[str]:
     """Options that load the file: platforms that fit, and those that ask nothing of its wheels."""
     kinds = ("skid_steer", "mecanum", "car", "wheeled")
-    found = [kind for kind in kinds if _fits(layout, kind)]
-    yield from (f"--platform {kind}" for kind in found)
+    fitting = [kind for kind in kinds if _fits(layout, kind)]
+    yield from (f"--platform {kind}" for kind in fitting)
     yield "--platform omnidirectional"
     yield "--platform unicycle"

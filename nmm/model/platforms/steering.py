@@ -123,7 +123,7 @@ def steered_pair(layout: Layout) -> SteeredPair | None:
     beside = [pivot for pivot in steering if abs(pivot.y) > NEAR]
     if len(beside) != 2:
         return None
-    one, other = beside
-    together = abs(one.x - other.x) <= NEAR and abs(one.y + other.y) <= NEAR
+    first, second = beside
+    together = abs(first.x - second.x) <= NEAR and abs(first.y + second.y) <= NEAR
     below = all(stands_below(wheel) for pivot in beside for wheel in wheels_on(layout, pivot.joint))
-    return SteeredPair((one, other)) if together and one.x > NEAR and below else None
+    return SteeredPair((first, second)) if together and first.x > NEAR and below else None

@@ -146,7 +146,7 @@ class Tractor(Platform):
         """The trailers of the file: the upright joints, one on another from the root's body on, whose names
         hold "hitch" or "trailer", each with wheels on one axle behind it; `InputError` where there is none,
         two are on one body, one is off the x axis, or a trailer lacks such wheels."""
-        found: list[Trailer] = []
+        trailers: list[Trailer] = []
         carrier, axle = "theta", 0.0
         while named := [pivot for pivot in layout.pivots if pivot.carrier == carrier and pivot.hitches]:
             if len(named) > 1:
@@ -157,13 +157,13 @@ class Tractor(Platform):
                 expected = "hitches midway between the wheels of the body in front"
                 raise misfit(layout, cls.name, expected, f"{pivot.joint} is off the x axis", named)
             length = _length(layout, cls.name, pivot)
-            found.append(Trailer(length, axle - pivot.x, pivot.joint, symmetric_limit(pivot)))
+            trailers.append(Trailer(length, axle - pivot.x, pivot.joint, symmetric_limit(pivot)))
             carrier, axle = pivot.joint, -length
-        if not found:
+        if not trailers:
             expected = 'an upright joint on the root\'s body with "hitch" or "trailer" in its name'
             raise misfit(layout, cls.name, expected, "there is none", layout.pivots)
         check_axle(layout, cls.name)
-        return cls(found)
+        return cls(trailers)
 
     @property
     def lengths(self) -> Mapping[str, float]:
@@ -191,8 +191,10 @@ class Tractor(Platform):
 
     def described(self) -> dict[str, str]:
         return {
-            f"trailer at {one.joint}": f"hitch {one.hitch:g} m behind the axle ahead, length {one.length:g} m"
-            for one in self.trailers
+            f"trailer at {trailer.joint}": (
+                f"hitch {trailer.hitch:g} m behind the axle ahead, length {trailer.length:g} m"
+            )
+            for trailer in self.trailers
         }
 
     def steered_axle(self, body: str) -> SteeredAxle | None:

@@ -144,11 +144,11 @@ class DifferentialDrive(Unicycle):
 
 
 def _why_no_axle(wheels: Sequence[RollingJoint]) -> str | None:
-    one, other = wheels
-    if not same([one.x, other.x]):
+    first, second = wheels
+    if not same([first.x, second.x]):
         return "they are not on one axle"
-    if abs(one.x) > NEAR:
-        return f"their axle is {ahead(one.x)}: give axle (--axle X,Y)"
-    if one.y * other.y >= 0.0 or abs(one.y + other.y) > NEAR:
+    if abs(first.x) > NEAR:
+        return f"their axle is {ahead(first.x)}: give axle (--axle X,Y)"
+    if first.y * second.y >= 0.0 or abs(first.y + second.y) > NEAR:
         return "they are not equally far to the left and right of the reference point: give axle (--axle X,Y)"
     return None

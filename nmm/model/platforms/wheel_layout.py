@@ -133,11 +133,11 @@ class Layout:
             return at.real, at.imag
 
         back = cmath.rect(1.0, -yaw)
-        pivots = [replace(one, x=at[0], y=at[1]) for one in self.pivots for at in (place(one),)]
+        pivots = [replace(pivot, x=at[0], y=at[1]) for pivot in self.pivots for at in (place(pivot),)]
         wheels = [
-            replace(one, x=at[0], y=at[1], heading=math.remainder(one.heading - yaw, 2.0 * math.pi))
-            for one in self.wheels
-            for at in (place(one),)
+            replace(wheel, x=at[0], y=at[1], heading=math.remainder(wheel.heading - yaw, 2.0 * math.pi))
+            for wheel in self.wheels
+            for at in (place(wheel),)
         ]
         return replace(self, pivots=tuple(pivots), wheels=tuple(wheels))
 
@@ -223,16 +223,16 @@ def symmetric_limit(pivot: Pivot) -> float | None:
 
 def described(parts: Iterable[Pivot | RollingJoint]) -> list[str]:
     """Name and place of each, and a pivot's carrier or a wheel's heading (unless forward) and radius."""
-    found = []
+    lines = []
     for part in parts:
         text = f"{part.joint} at ({_m(part.x)}, {_m(part.y)}) m"
         if isinstance(part, Pivot):
-            found.append(f"{text} on {part.carrier}")
+            lines.append(f"{text} on {part.carrier}")
             continue
         turned = "" if rolls_forward(part) else f" rolling at {math.degrees(part.heading):.4g} degrees"
         radius = "unknown" if math.isnan(part.radius) else f"{_m(part.radius)} m"
-        found.append(f"{text}{turned}, radius {radius}")
-    return found
+        lines.append(f"{text}{turned}, radius {radius}")
+    return lines
 
 
 def _m(length: float) -> str:
@@ -246,11 +246,11 @@ def ahead(x: float) -> str:
 
 
 def misfit(
-    layout: Layout, platform: str, expected: str, wrong: str, found: Iterable[Pivot | RollingJoint]
+    layout: Layout, platform: str, expected: str, wrong: str, parts: Iterable[Pivot | RollingJoint]
 ) -> InputError:
     """The error of a `fit`: what the platform expects, what is wrong, and what the file has."""
     where = f"{layout.robot}: platform {platform}"
-    return InputError(wrong, where=where, expected=expected, got=described(found))
+    return InputError(wrong, where=where, expected=expected, got=described(parts))
 
 
 def main_wheels(
@@ -303,10 +303,10 @@ def steered_too_little(layout: Layout, platform: str) -> tuple[Finding, ...]:
     steering = steering_pivots(layout)
     if not any(wheels_on(layout, pivot.joint) for pivot in steering):
         return ()
-    found = []
+    findings = []
     for pivot in steering:
         if max(-pivot.lower, pivot.upper) < math.pi / 2:
             limits = {"lower": math.degrees(pivot.lower), "upper": math.degrees(pivot.upper)}
             values = {"platform": platform, "name": pivot.joint, **limits}
-            found.append(Finding("steering_too_narrow", values))
-    return tuple(found)
+            findings.append(Finding("steering_too_narrow", values))
+    return tuple(findings)

@@ -106,11 +106,11 @@ class Bodies:
 
     def frames(self, qp: Array) -> list[tuple[complex, float]]:
         """Origin (m) and angle (rad) of every body in the world."""
-        found = [(complex(qp[0], qp[1]), float(qp[2]))]
+        poses = [(complex(qp[0], qp[1]), float(qp[2]))]
         for body, turn in zip(self.all[1:], qp[3:], strict=True):
-            origin, angle = found[body.carrier]
-            found.append((origin + cmath.rect(1.0, angle) * body.place, angle + float(turn)))
-        return found
+            origin, angle = poses[body.carrier]
+            poses.append((origin + cmath.rect(1.0, angle) * body.place, angle + float(turn)))
+        return poses
 
     def row(self, terms: Iterable[Term], qp: Array) -> Array:
         """The row over qp_dot, (n_p,), of a sum of terms."""

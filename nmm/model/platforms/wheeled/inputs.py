@@ -75,8 +75,8 @@ class WeightedSpins:
     name: str = "drive"
 
     def __post_init__(self) -> None:
-        given = isinstance(self.weights, Mapping) and self.weights
-        expect(given, f"input {self.name}", "a weight for each wheel's name", self.weights)
+        valid = isinstance(self.weights, Mapping) and self.weights
+        expect(valid, f"input {self.name}", "a weight for each wheel's name", self.weights)
         where = f"input {self.name}: weight of"
         weights = {wheel: scalar(weight, f"{where} {wheel}") for wheel, weight in self.weights.items()}
         object.__setattr__(self, "weights", weights)
@@ -108,28 +108,28 @@ Input = str | WheelSpeed | WheelSpin | WeightedSpins | CommonSpeed
 Named = tuple[str, str, Row]
 
 
-def read(given: Input, bodies: Bodies, wheels: Mapping[str, WheelDescription]) -> Named:
+def read(requested: Input, bodies: Bodies, wheels: Mapping[str, WheelDescription]) -> Named:
     """Name, unit and row of an input; `InputError` for unknown names, casters, pivots that coincide."""
-    if isinstance(given, str):
-        return _by_name(given, bodies, wheels)
-    if isinstance(given, WheelSpeed):
-        wheel = _wheel(given.wheel, wheels, given.name or "WheelSpeed")
+    if isinstance(requested, str):
+        return _by_name(requested, bodies, wheels)
+    if isinstance(requested, WheelSpeed):
+        wheel = _wheel(requested.wheel, wheels, requested.name or "WheelSpeed")
         rolling_term(bodies, wheel)  # refuses casters
-        return given.name or f"{wheel.name}_speed", "m/s", Velocity((bodies.contact(wheel),))
-    if isinstance(given, WheelSpin):
-        wheel = _wheel(given.wheel, wheels, given.name or "WheelSpin")
-        return given.name or f"{wheel.name}_spin", "rad/s", Velocity((rolling_term(bodies, wheel),))
-    if isinstance(given, WeightedSpins):
+        return requested.name or f"{wheel.name}_speed", "m/s", Velocity((bodies.contact(wheel),))
+    if isinstance(requested, WheelSpin):
+        wheel = _wheel(requested.wheel, wheels, requested.name or "WheelSpin")
+        return requested.name or f"{wheel.name}_spin", "rad/s", Velocity((rolling_term(bodies, wheel),))
+    if isinstance(requested, WeightedSpins):
         terms = []
-        for name, weight in given.weights.items():
-            term = rolling_term(bodies, _wheel(name, wheels, given.name))
+        for name, weight in requested.weights.items():
+            term = rolling_term(bodies, _wheel(name, wheels, requested.name))
             terms.append(Term(term.body, term.point, term.direction, weight * term.weight))
-        return given.name, "rad/s", Velocity(tuple(terms))
-    if isinstance(given, CommonSpeed):
-        pair = [_wheel(name, wheels, given.name) for name in (given.first, given.second)]
-        return given.name, "m/s", _common(bodies, pair)
+        return requested.name, "rad/s", Velocity(tuple(terms))
+    if isinstance(requested, CommonSpeed):
+        pair = [_wheel(name, wheels, requested.name) for name in (requested.first, requested.second)]
+        return requested.name, "m/s", _common(bodies, pair)
     expected = "names, WheelSpeed, WheelSpin, WeightedSpins or CommonSpeed"
-    raise InputError(where="inputs", expected=expected, got=given)
+    raise InputError(where="inputs", expected=expected, got=requested)
 
 
 def _by_name(name: str, bodies: Bodies, wheels: Mapping[str, WheelDescription]) -> Named:

@@ -158,11 +158,13 @@ class WheeledPlatform(Platform):
         return self.p - self.mobility
 
     def described(self) -> dict[str, str]:
-        found = {}
+        parts = {}
         for wheel in self.wheels:
             at = f"({wheel.x:.4g}, {wheel.y:.4g}) m on {wheel.body}"
-            found[f"{type(wheel).__name__} {wheel.name}"] = f"at {at}, radius {wheel.radius:.4g} m"
-        return found | {f"Hitch {one.joint}": f"at ({one.x:.4g}, {one.y:.4g}) m" for one in self.hitches}
+            parts[f"{type(wheel).__name__} {wheel.name}"] = f"at {at}, radius {wheel.radius:.4g} m"
+        return parts | {
+            f"Hitch {hitch.joint}": f"at ({hitch.x:.4g}, {hitch.y:.4g}) m" for hitch in self.hitches
+        }
 
     def pfaffian(self, qp: Array) -> Array:
         """No sideways motion of a wheel on each independent axis, and steering that keeps axes concurrent."""
@@ -172,10 +174,10 @@ class WheeledPlatform(Platform):
     def problem(self, qp: ArrayLike) -> str | None:
         """Which wheels' axes contradict each other, or with which wheel an input ceases to say anything."""
         qp = vector(qp, self.n_p, "qp")
-        found = self._structure.contradiction(qp)
-        if found is None and not np.all(np.isfinite(self.G(qp))):
-            found = self._structure.singularity(qp)
-        return found or self._structure.folded(qp)
+        reason = self._structure.contradiction(qp)
+        if reason is None and not np.all(np.isfinite(self.G(qp))):
+            reason = self._structure.singularity(qp)
+        return reason or self._structure.folded(qp)
 
     def roller(self, x: float, y: float) -> float:
         """Angle γ of the rollers of the main body's wheel that is nearest to (x, y)."""
@@ -229,18 +231,18 @@ class WheeledPlatform(Platform):
         casters = [wheel.name for wheel in self.wheels if isinstance(wheel, CasterWheel)]
         for name in angles:
             expect_known("caster", name, casters, "swivels")
-        found = {}
+        rates = {}
         for wheel in self.wheels:
             if isinstance(wheel, CasterWheel):
                 angle = scalar(angles.get(wheel.name, 0.0), f"swivel of {wheel.name}")
-                found[wheel.name] = _caster(self._bodies, wheel, qp, qp_dot, angle)
+                rates[wheel.name] = _caster(self._bodies, wheel, qp, qp_dot, angle)
                 continue
             spin = float(self._bodies.row([rolling_term(self._bodies, wheel)], qp) @ qp_dot)
             turn = 0.0
             if isinstance(wheel, SteeredWheel):
                 turn = float(qp_dot[2 + self._bodies.number(wheel.joint)])
-            found[wheel.name] = WheelRate(spin, turn)
-        return found
+            rates[wheel.name] = WheelRate(spin, turn)
+        return rates
 
     def _packed(self) -> Array:
         sections: list[list[list[float]]] = [[] for _ in range(SIZE + 1)]
@@ -262,8 +264,8 @@ def _check_distinct(names: Sequence[str], what: str) -> None:
 
 def _lengths(wheels: Sequence[WheelDescription], hitches: Sequence[Hitch]) -> dict[str, float]:
     places = {wheel.name: wheel for wheel in wheels} | {hitch.joint: hitch for hitch in hitches}
-    found = {f"{axis} of {name}": getattr(at, axis) for name, at in places.items() for axis in ("x", "y")}
-    return found | {f"radius of {wheel.name}": wheel.radius for wheel in wheels}
+    lengths = {f"{axis} of {name}": getattr(at, axis) for name, at in places.items() for axis in ("x", "y")}
+    return lengths | {f"radius of {wheel.name}": wheel.radius for wheel in wheels}
 
 
 def _caster(bodies: Bodies, wheel: CasterWheel, qp: Array, qp_dot: Array, angle: float) -> WheelRate:

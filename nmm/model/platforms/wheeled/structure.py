@@ -57,7 +57,9 @@ class Structure:
         self.followed: list[Followed] = []
         self._n = 2 + len(bodies.all)
         self._wheels = {wheel.name: wheel for wheel in wheels}
-        self._asked = None if inputs is None else [read(given, bodies, self._wheels) for given in inputs]
+        self._asked = (
+            None if inputs is None else [read(requested, bodies, self._wheels) for requested in inputs]
+        )
         spread = [abs(complex(w.x, w.y)) for w in wheels] + [abs(body.place) for body in bodies.all]
         self._length = max(spread, default=0.0) or 1.0
         angles = np.random.default_rng(0).uniform(-1.0, 1.0, (4, self._n))
@@ -108,10 +110,10 @@ class Structure:
                 f"axes coincide or meet): the platform gains a motion{self._angles(wheels, qp)}"
             )
         A = self.pfaffian
-        found = self._dependent([*A, *(row for _, _, row in self.inputs)], qp)
-        wheels = _wheels(self.constraints[k] for k in found if k < count)
-        wheels += [self.followed[k - count].wheel for k in found if count <= k < len(A)]
-        chosen = [self.inputs[k - len(A)][0] for k in found if k >= len(A)]
+        dependent = self._dependent([*A, *(row for _, _, row in self.inputs)], qp)
+        wheels = _wheels(self.constraints[k] for k in dependent if k < count)
+        wheels += [self.followed[k - count].wheel for k in dependent if count <= k < len(A)]
+        chosen = [self.inputs[k - len(A)][0] for k in dependent if k >= len(A)]
         names = " and ".join(chosen) or "the inputs"
         verb = "do" if len(chosen) != 1 else "does"
         where = f", because of {_listed(wheels)}{self._angles(wheels, qp)}" if wheels else ""
@@ -121,8 +123,8 @@ class Structure:
         """The rows in the combination that is closest to zero, when it is zero."""
         if not rows:
             return []
-        found = [row.at(self.bodies, qp) for row in rows]
-        left, sizes, _ = np.linalg.svd(np.array([row / (np.linalg.norm(row) or 1.0) for row in found]))
+        values = [row.at(self.bodies, qp) for row in rows]
+        left, sizes, _ = np.linalg.svd(np.array([row / (np.linalg.norm(row) or 1.0) for row in values]))
         if len(sizes) == len(rows) and sizes[-1] > 1e-7:
             return []
         return [k for k, share in enumerate(left[:, -1]) if abs(share) > 1e-4]
@@ -189,12 +191,12 @@ class Structure:
         return [*self.pfaffian, *asked]
 
     def _takes_a_motion(self, row: Row, samples: Array) -> bool:
-        """Whether the row leaves the inputs asked for independent or, without, a motion besides steering."""
-        kept = self._kept
+        """Whether the row leaves requested inputs independent; without such, a motion besides steering."""
+        rows = self._kept
         # Coordinates that the motion does not turn of itself.
         free = self._n - len(self.bodies.steering) + len(self._held)
-        room = self._asked is not None or self._rank(kept, samples) + 1 < free
-        return room and self._is_new(row, *kept, samples=samples)
+        room = self._asked is not None or self._rank(rows, samples) + 1 < free
+        return room and self._is_new(row, *rows, samples=samples)
 
     def _no_room(self, wheel: WheelDescription) -> InputError:
         names = ", ".join(name for name, _, _ in self._asked or ()) or "of steering"
@@ -232,8 +234,8 @@ class Structure:
 
         for named in self._asked or ():
             if not is_new(named):
-                given = ["the wheels", *(name for name, _, _ in chosen)]
-                raise InputError(f"determined by {listed(given)} already", where=f"input {named[0]}")
+                earlier = ["the wheels", *(name for name, _, _ in chosen)]
+                raise InputError(f"determined by {listed(earlier)} already", where=f"input {named[0]}")
             chosen.append(named)
         for named in self._motions() if self._asked is None else ():
             if is_new(named, *rates):
@@ -257,11 +259,11 @@ class Structure:
         standing = [w for w in standing if not isinstance(w, SteeredWheel) or w.centered]
         names = ["v", "omega", "vx", "vy"] if standing else ["vx", "vy", "omega"]
         names += [f"{body.name}_rate" for body in self.bodies.all[1:] if not body.steers]
-        found = [read(name, self.bodies, self._wheels) for name in names]
+        inputs = [read(name, self.bodies, self._wheels) for name in names]
         fixed = [axis_of(self.bodies, w) for w in standing if isinstance(w, FixedWheel)]
         lines = [axis.line(np.zeros(self._n)) for axis in fixed]
         turns_only = len(lines) == 2 and abs(np.cross(lines[0], lines[1])[2]) > DEPENDENT
-        return [found[1], found[0], *found[2:]] if turns_only else found
+        return [inputs[1], inputs[0], *inputs[2:]] if turns_only else inputs
 
 
 def _wheels(constraints: Iterable[Constraint]) -> list[WheelDescription]:
