@@ -176,20 +176,20 @@ class Dynamics:
         return T_dot
 
     def _checked(self, q: ArrayLike, u: ArrayLike, u_dot: ArrayLike) -> tuple[Array, Array, Array]:
-        found = [np.atleast_2d(array(x, name)) for x, name in ((q, "q"), (u, "u"), (u_dot, "u_dot"))]
+        arrays = [np.atleast_2d(array(x, name)) for x, name in ((q, "q"), (u, "u"), (u_dot, "u_dot"))]
         n, n_u = self.robot.n, self.robot.n_u
-        for x, name, size in zip(found, ("q", "u", "u_dot"), (n, n_u, n_u), strict=True):
-            shape = (len(found[0]), size)
+        for x, name, size in zip(arrays, ("q", "u", "u_dot"), (n, n_u, n_u), strict=True):
+            shape = (len(arrays[0]), size)
             expect(x.shape == shape, name, f"{size} numbers, or a matrix of shape {shape}", x)
-        return found[0], found[1], found[2]
+        return arrays[0], arrays[1], arrays[2]
 
 
 def _loaded(robot: Robot, payload: Payload) -> pin.Model:
     """The display model with masses in frames."""
     model = robot.display_model.copy() if payload else robot.display_model
-    for name, given in payload.items():
+    for name, load in payload.items():
         where = f"payload: {name}"
-        mass, place = given if isinstance(given, tuple | list) and len(given) == 2 else (given, np.zeros(3))
+        mass, place = load if isinstance(load, tuple | list) and len(load) == 2 else (load, np.zeros(3))
         if name not in robot.frames or not model.existFrame(name):
             raise no_such("frame", name, robot.frames, "payload")
         frame = model.frames[frame_index(model, name)]

@@ -63,8 +63,8 @@ class Support:
             x, y = (points - q[:, :2]).T
             seen = np.stack([cosine * x + sine * y, cosine * y - sine * x], axis=1)
             return self._inside(home, seen)
-        found = [self._inside(one, point[np.newaxis]) for one, point in zip(q, points, strict=True)]
-        return np.concatenate([one for one, _ in found]), [edges[0] for _, edges in found]
+        results = [self._inside(row, point[np.newaxis]) for row, point in zip(q, points, strict=True)]
+        return np.concatenate([margins for margins, _ in results]), [edges[0] for _, edges in results]
 
     def _inside(self, q: Array, points: Array) -> tuple[Array, list[tuple[str, str]]]:
         """Of points (N, 2) at one q (n,)."""

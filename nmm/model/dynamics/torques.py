@@ -103,7 +103,7 @@ class Torques:
     @cached_property
     def findings(self) -> tuple[Finding, ...]:
         """Motors over their effort, and a robot that tips."""
-        found = []
+        findings = []
         for j in np.flatnonzero(self.peaks > self.efforts):
             k = int(np.abs(self.torques[:, j]).argmax())
             values = {
@@ -112,14 +112,14 @@ class Torques:
                 "effort": float(self.efforts[j]),
                 "unit": self.dynamics.actuators.units[j],
             }
-            found.append(Finding("effort_exceeded", values, {"t": float(self.t[k])}))
+            findings.append(Finding("effort_exceeded", values, {"t": float(self.t[k])}))
         k = int(self.margins.argmin())
         if self.margins[k] < 0.0:
             margin = float(self.margins[k])
             values = {"margin": margin if np.isfinite(margin) else None, "edge": list(self.edges[k])}
             values["jumps"] = self._jumps_at(k)
-            found.append(Finding("tips", values, {"t": float(self.t[k])}))
-        return tuple(found)
+            findings.append(Finding("tips", values, {"t": float(self.t[k])}))
+        return tuple(findings)
 
     def _jumps_at(self, k: int) -> dict[str, float]:
         """By input, what it changes by around sample k, where that takes a few samples alone, and is more
@@ -157,7 +157,7 @@ class Torques:
             "tipping": None if np.isposinf(self.margins[least]) else tips,
             "jumps": self.t[:-1][self.jumps[:-1]].tolist(),
             "left_out": list(self.dynamics.left_out),
-            "findings": [one.as_json() for one in self.findings],
+            "findings": [finding.as_json() for finding in self.findings],
         }
 
     def columns(self) -> dict[str, Array]:
@@ -202,7 +202,7 @@ def torques_along(
         f, from_ground = dynamics.forces(q[some], u[some], u_dot[some])
         motors = dynamics.actuators
         parts.append((motors.torques(q[some], f), motors.rates(q[some], u[some]), from_ground))
-    torques, rates, ground = (np.concatenate(one) for one in zip(*parts, strict=True))
+    torques, rates, ground = (np.concatenate(chunks) for chunks in zip(*parts, strict=True))
     acts = support.zero_moment(ground) if robot.platform.n_p else np.zeros((len(t), 2))
     margins, edges = support.margins(q, acts)
     return Torques(dynamics, t, torques, rates, u, jumps, acts, margins, tuple(edges))
