@@ -100,7 +100,7 @@ def find_near(integers: Integers, floats: Array, places: Array) -> int:
     centers = scratch((count + 1, 3))
     for i in range(count):
         to_world(places, i, boxes[i, 0], boxes[i, 1], boxes[i, 2], centers, i)
-    found = 0
+    changed = 0
     for k in range(scene.pairs.shape[0]):
         i, j = scene.pairs[k, 0], scene.pairs[k, 1]
         if j >= scene.planes[()]:
@@ -117,6 +117,6 @@ def find_near(integers: Integers, floats: Array, places: Array) -> int:
         near = 1 if bound < band else 0
         if near != scene.active[k]:
             scene.active[k] = near
-            scene.changed[found] = k
-            found += 1
-    return found
+            scene.changed[changed] = k
+            changed += 1
+    return changed

@@ -86,8 +86,8 @@ class Obstacle:
 
     def placement(self, t: float) -> Array:
         """Where it is at t, s: (4, 4), world axes, m."""
-        found: Array = self.at(t).homogeneous
-        return found
+        pose: Array = self.at(t).homogeneous
+        return pose
 
     def move_to(self, placement: Placement, velocity: ArrayLike | None = None) -> None:
         """Set where it is from now on.
@@ -104,9 +104,9 @@ class Obstacle:
         """
         if self.motion is not None:
             raise InputError("it moves along a path and cannot be set", where=f"obstacle {self.name}")
-        found = self._checked(placement)
+        pose = self._checked(placement)
         self._twist = np.zeros(6) if velocity is None else self._six(velocity)
-        self._placement = found
+        self._placement = pose
 
     def at(self, t: float) -> Any:
         """As `placement`, Pinocchio's; the same object as long as nothing sets it."""
@@ -135,8 +135,8 @@ class Obstacle:
         return np.concatenate([ahead.translation - behind.translation, turned]) / (2.0 * STEP)
 
     def _six(self, velocity: ArrayLike) -> Array:
-        given = vector(velocity, (3, 6), f"obstacle {self.name}: velocity")
-        return np.concatenate([given, np.zeros(6 - given.size)])
+        components = vector(velocity, (3, 6), f"obstacle {self.name}: velocity")
+        return np.concatenate([components, np.zeros(6 - components.size)])
 
     def _checked(self, placement: Placement) -> Any:
         # What a motion usually returns: the look-ahead calls it many times per sample.
@@ -145,19 +145,19 @@ class Obstacle:
             if six.dot(six) < np.inf:
                 return pin.SE3(pin.exp3(six[3:]), six[:3])
         name = f"obstacle {self.name}: {'placement' if self.motion is None else 'motion'}"
-        given = array(placement, name)
-        if given.shape == (4, 4):
-            rotation = given[:3, :3]
+        values = array(placement, name)
+        if values.shape == (4, 4):
+            rotation = values[:3, :3]
             off = np.inf if np.linalg.det(rotation) < 0.0 else np.abs(rotation @ rotation.T - np.eye(3)).max()
             expect(off <= 1e-6, name, "a rotation in the upper left of the matrix")
-            far = np.abs(given[3] - (0.0, 0.0, 0.0, 1.0)).max()
-            expect(far <= 1e-6, name, "0, 0, 0, 1 in the last row", given[3])
-            return pin.SE3(rotation, given[:3, 3])
-        if given.shape == (3,):
-            return pin.SE3(np.eye(3), given)
-        if given.shape == (6,):
-            return pin.SE3(pin.exp3(given[3:]), given[:3])
-        raise InputError(where=name, expected="3 or 6 numbers or a (4, 4) matrix", got=given)
+            far = np.abs(values[3] - (0.0, 0.0, 0.0, 1.0)).max()
+            expect(far <= 1e-6, name, "0, 0, 0, 1 in the last row", values[3])
+            return pin.SE3(rotation, values[:3, 3])
+        if values.shape == (3,):
+            return pin.SE3(np.eye(3), values)
+        if values.shape == (6,):
+            return pin.SE3(pin.exp3(values[3:]), values[:3])
+        raise InputError(where=name, expected="3 or 6 numbers or a (4, 4) matrix", got=values)
 
 
 class Passed:
@@ -206,33 +206,33 @@ def obstacle_places(obstacle: Obstacle, t: Array) -> Array:
 
 def shifts(obstacles: Sequence[Obstacle], t: Array) -> Array:
     """The most that a point of an obstacle moves between samples t (N,), s: (N - 1,), m."""
-    found = np.zeros(max(len(t) - 1, 0))
-    for one in obstacles:
-        if not one.moves:
+    largest = np.zeros(max(len(t) - 1, 0))
+    for obstacle in obstacles:
+        if not obstacle.moves:
             continue
-        geometry = one.shape.geometry()
+        geometry = obstacle.shape.geometry()
         geometry.computeLocalAABB()
         size = float(np.linalg.norm(geometry.aabb_center)) + float(geometry.aabb_radius)
-        at = [one.at(float(time)) for time in t]
+        at = [obstacle.at(float(time)) for time in t]
         for k, (before, after) in enumerate(pairwise(at)):
             turned = float(np.linalg.norm(pin.log3(before.rotation.T @ after.rotation)))
             way = float(np.linalg.norm(after.translation - before.translation))
-            found[k] = max(found[k], way + (turned * size if turned else 0.0))
-    return found
+            largest[k] = max(largest[k], way + (turned * size if turned else 0.0))
+    return largest
 
 
 def obstacle_as_json(shape: Shape) -> tuple[dict[str, Any], Array]:
     """A shape in plain data, and the points (N, 3) of a hull, so that a mesh's file is no longer needed."""
     if isinstance(shape, ConvexMesh | Hull):
         return {"kind": "hull"}, np.array(shape.geometry().points()).reshape(-1, 3)
-    found = {one.name: getattr(shape, one.name) for one in fields(shape)}  # type: ignore[arg-type]  # all are dataclasses
-    return {"kind": type(shape).__name__.lower(), **found}, np.zeros((0, 3))
+    parameters = {field.name: getattr(shape, field.name) for field in fields(shape)}  # type: ignore[arg-type]  # all are dataclasses
+    return {"kind": type(shape).__name__.lower(), **parameters}, np.zeros((0, 3))
 
 
 def shape_from_json(data: Mapping[str, Any], points: Array) -> Shape:
     """The shape that `obstacle_as_json` described; `InputError` or `TypeError` for what it cannot have."""
     expect_known("kind", data.get("kind"), KINDS)
-    given = {key: value for key, value in data.items() if key != "kind"}
+    parameters = {key: value for key, value in data.items() if key != "kind"}
     if data["kind"] == "hull":
-        given["points"] = points
-    return KINDS[data["kind"]](**given)
+        parameters["points"] = points
+    return KINDS[data["kind"]](**parameters)

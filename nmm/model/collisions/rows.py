@@ -162,10 +162,17 @@ def write_rows(
 
 @compiled
 def facing(
-    scene: PairArrays, places: Array, shape: int, x: Array, side: int, e: Array, deepest: float, found: Array
+    scene: PairArrays,
+    places: Array,
+    shape: int,
+    x: Array,
+    side: int,
+    e: Array,
+    deepest: float,
+    corners: Array,
 ) -> int:
     """Write the corners of a shape that lie along the other one, and return their count.
-    found (CORNERS, 4) : place in e (2, 3) about the nearest point, m behind it, distance in e squared"""
+    corners (CORNERS, 4) : place in e (2, 3) about the nearest point, m behind it, distance in e squared"""
     sign = 1.0 if side == 0 else -1.0
     count = 0
     to, local = scratch(3), scratch((3, 3))  # the nearest point from the shape's origin; n and e in its axes
@@ -197,13 +204,13 @@ def facing(
         if count == CORNERS:  # replaces the one nearest to the middle
             slot = 0
             for k in range(CORNERS):
-                if found[k, 3] < found[slot, 3]:
+                if corners[k, 3] < corners[slot, 3]:
                     slot = k
-            if square <= found[slot, 3]:
+            if square <= corners[slot, 3]:
                 continue
         else:
             count += 1
-        found[slot, 0], found[slot, 1], found[slot, 2], found[slot, 3] = u, v, depth, square
+        corners[slot, 0], corners[slot, 1], corners[slot, 2], corners[slot, 3] = u, v, depth, square
     return count
 
 
@@ -224,14 +231,14 @@ def add_faces(scene: PairArrays, places: Array, J: Array, rows: Rows, slot: int,
     for k in range(3):
         e[0, k] = (e[0, k] - x[6 + least] * x[6 + k]) / size
     cross3(x[6:], e[0], e[1])
-    one, two = scratch((CORNERS, 4)), scratch((CORNERS, 4))
+    first_corners, second_corners = scratch((CORNERS, 4)), scratch((CORNERS, 4))
     plane = j >= scene.planes[()]
-    first = facing(scene, places, i, x, 0, e, DEEPEST, one)
-    second = 0 if plane else facing(scene, places, j, x, 1, e, DEEPEST, two)
+    first = facing(scene, places, i, x, 0, e, DEEPEST, first_corners)
+    second = 0 if plane else facing(scene, places, j, x, 1, e, DEEPEST, second_corners)
     if first == 0 or (second == 0 and not plane):  # a part in common takes two
         return used
     for side in range(0 if plane else 2):
-        corners = one if side == 0 else two
+        corners = first_corners if side == 0 else second_corners
         for k in range(COUNT):
             reach = 0.0
             for a in range(first if side == 0 else second):
@@ -240,7 +247,7 @@ def add_faces(scene: PairArrays, places: Array, J: Array, rows: Rows, slot: int,
     best = scratch((4, 4))
     clear(best)
     for side in range(2):
-        corners = one if side == 0 else two
+        corners = first_corners if side == 0 else second_corners
         for a in range(first if side == 0 else second):
             u, v, depth, size = corners[a, 0], corners[a, 1], corners[a, 2], math.sqrt(corners[a, 3])
             quadrant = (2 if u > 0.0 else 0) + (1 if v > 0.0 else 0)

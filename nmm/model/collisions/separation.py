@@ -120,9 +120,9 @@ def nearest_point(simplex: Array, count: int, v: Array) -> int:
             nx = (b[1] - a[1]) * (c[2] - a[2]) - (b[2] - a[2]) * (c[1] - a[1])
             ny = (b[2] - a[2]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[2] - a[2])
             nz = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-            here = -(nx * a[0] + ny * a[1] + nz * a[2])
-            there = nx * (o[0] - a[0]) + ny * (o[1] - a[1]) + nz * (o[2] - a[2])
-            if here * there > 0.0:
+            to_origin = -(nx * a[0] + ny * a[1] + nz * a[2])
+            to_corner = nx * (o[0] - a[0]) + ny * (o[1] - a[1]) + nz * (o[2] - a[2])
+            if to_origin * to_corner > 0.0:
                 continue
             inside = False
         corner_share(simplex[i], simplex[j], simplex[k], trial)
@@ -143,13 +143,13 @@ def nearest_point(simplex: Array, count: int, v: Array) -> int:
                 v[axis] = point[axis]
     if inside:
         return 4
-    kept = 0
+    remaining = 0
     for corner in range(count):
         if weights[corner] > 0.0:
             for axis in range(3):
-                simplex[kept, axis] = simplex[corner, axis]
-            kept += 1
-    return kept
+                simplex[remaining, axis] = simplex[corner, axis]
+            remaining += 1
+    return remaining
 
 
 @compiled

@@ -236,18 +236,18 @@ def _made(points: Array) -> tuple[Array, Integers]:
 
     size = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
     try:
-        found = ConvexHull(points)
-        if np.bincount(found.simplices.ravel()).max() > MOST_NEIGHBORS:
-            found = ConvexHull(points, qhull_options="QJ")  # moved by rounding, a flat side is no fan
+        hull = ConvexHull(points)
+        if np.bincount(hull.simplices.ravel()).max() > MOST_NEIGHBORS:
+            hull = ConvexHull(points, qhull_options="QJ")  # moved by rounding, a flat side is no fan
     except (QhullError, ValueError):
-        found = None
-    if found is None or found.volume <= FLAT * size**3:
+        hull = None
+    if hull is None or hull.volume <= FLAT * size**3:
         raise InputError(f"its {len(points)} points enclose no volume")
     number = np.empty(len(points), dtype=np.int64)
-    number[found.vertices] = np.arange(len(found.vertices))
-    corners, faces = found.points[found.vertices], number[found.simplices]
+    number[hull.vertices] = np.arange(len(hull.vertices))
+    corners, faces = hull.points[hull.vertices], number[hull.simplices]
     # Qhull's triangles have either orientation; Coal expects outward normals.
     a, b, c = (corners[faces[:, k]] for k in range(3))
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), found.equations[:, :3]) < 0.0
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0.0
     faces[inward] = faces[inward][:, ::-1]
     return np.ascontiguousarray(corners), faces

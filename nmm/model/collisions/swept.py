@@ -95,23 +95,23 @@ def lay(way_blocks: Blocks, q: Array, u: Array, dt: float) -> int:
         hold(way.inputs, q, u, dt * (i + 1) / count, way.q[i])
     share, gone = 1.0, 0.0
     weight = after = dt
-    here, ahead = scratch(q.shape[0]), scratch(q.shape[0])
+    current, ahead = scratch(q.shape[0]), scratch(q.shape[0])
     now, slower = scratch(u.shape[0]), scratch(u.shape[0])
-    copied(way.q[count - 1], here)
+    copied(way.q[count - 1], current)
     copied(u, now)
     for _ in range(min(DRIVEN, round(float(way.lasts[()]) / dt))):
         size = 0.0
         for j in range(u.shape[0]):
             now[j] += min(max(way.driven[j] - now[j], -way.falling[j] * dt), way.rising[j] * dt)
             size += abs(now[j])
-        hold(way.inputs, here, now, dt, ahead)
-        copied(ahead, here)
+        hold(way.inputs, current, now, dt, ahead)
+        copied(ahead, current)
         after += dt
         weight += dt
         gone += dt * size
         if gone > APART:
             way.after[count], way.weight[count] = after, weight
-            copied(here, way.q[count])
+            copied(current, way.q[count])
             count += 1
             gone = 0.0
     step = braking_share(way.falling, way.rising, now, dt)
@@ -121,14 +121,14 @@ def lay(way_blocks: Blocks, q: Array, u: Array, dt: float) -> int:
         if not last:
             for j in range(u.shape[0]):
                 slower[j] = share * now[j]
-            hold(way.inputs, here, slower, dt, ahead)
-            copied(ahead, here)
+            hold(way.inputs, current, slower, dt, ahead)
+            copied(ahead, current)
             after += dt
             weight += share * dt
             gone += dt * share * size
         if gone > (0.0 if last else APART):
             way.after[count], way.weight[count] = after, weight
-            copied(here, way.q[count])
+            copied(current, way.q[count])
             count += 1
             gone = 0.0
         if last:
@@ -148,10 +148,10 @@ def reach(scene: PairArrays, way: SweptMotion, shape: int, x: float, y: float, z
     """Extent of a shape along a direction in its axes, m; infinite where unknown."""
     if way.disc[shape] > 0.0:
         return way.disc[shape] * math.hypot(x, y) + scene.boxes[shape, 5] * abs(z)
-    found = -math.inf
+    extent = -math.inf
     for c in range(scene.first_corner[shape], scene.first_corner[shape + 1]):
-        found = max(found, x * scene.corners[c, 0] + y * scene.corners[c, 1] + z * scene.corners[c, 2])
-    return found + scene.rounding[shape] if found > -math.inf else math.inf
+        extent = max(extent, x * scene.corners[c, 0] + y * scene.corners[c, 1] + z * scene.corners[c, 2])
+    return extent + scene.rounding[shape] if extent > -math.inf else math.inf
 
 
 @compiled
@@ -237,13 +237,13 @@ def stray(scene: PairArrays, way: SweptMotion, places: Array, shape: int) -> flo
     farthest = 0.0
     box = scene.boxes[shape]
     for k in range(way.later.shape[0] if way.path[shape] >= 0 else 0):
-        there = way.grid[way.path[shape], k]
+        pose = way.grid[way.path[shape], k]
         moved = 0.0
         turned = 0.0
         for i in range(3):
-            shift = there[9 + i] - places[shape, 9 + i]
+            shift = pose[9 + i] - places[shape, 9 + i]
             for a in range(3):
-                change = there[3 * a + i] - places[shape, 3 * a + i]
+                change = pose[3 * a + i] - places[shape, 3 * a + i]
                 shift += change * box[a]
                 turned += change * change
             moved += shift * shift
@@ -316,13 +316,15 @@ def list_risky(
             continue
         i, j = scene.pairs[k, 0], scene.pairs[k, 1]
         room = scene.bounds[k] - scene.kept[k]
-        one = 0.0
-        two = 0.0
+        by_first = 0.0
+        by_second = 0.0
         few = room >= total[i] + (total[j] if j < scene.planes[()] else 0.0)
         for c in range(0 if few else n):
             if scene.apart[k, c] > 0.0:
-                one += moved[i, c]
-                two += moved[j, c] if j < scene.planes[()] and scene.supports[j, c] > 0.0 else moved[i, c]
+                by_first += moved[i, c]
+                by_second += (
+                    moved[j, c] if j < scene.planes[()] and scene.supports[j, c] > 0.0 else moved[i, c]
+                )
         t = scene.twists[j]
         speed = math.sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
         turn = math.sqrt(t[3] * t[3] + t[4] * t[4] + t[5] * t[5])
@@ -331,7 +333,7 @@ def list_risky(
             for a in range(3):
                 square += (places[i, 9 + a] - places[j, 9 + a]) ** 2
             speed += turn * (math.sqrt(square) + 2.0 * scene.boxes[i, 6])
-        if room < max(one, two) + max(time * speed, strays[j]):
+        if room < max(by_first, by_second) + max(time * speed, strays[j]):
             scene.watched[k] = 1
             scene.risky[listed] = k
             listed += 1
