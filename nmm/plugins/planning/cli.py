@@ -85,7 +85,7 @@ def plan(
     if to is not None:
         changed["plan.to"] = _coordinates(to, "--to")
     if through:
-        changed["plan.through"] = [_coordinates(one, "--through") for one in through]
+        changed["plan.through"] = [_coordinates(text, "--through") for text in through]
     changed |= {
         f"plan.{key}": value
         for key, value in (("seconds", seconds), ("seed", seed), ("hold", hold))
@@ -96,26 +96,26 @@ def plan(
     folder = out or Path("runs") / f"{made.name}-plan"
     check_folder(folder, is_run)
     with progress(f"{made.name}, plan") as report:
-        found = made.plan(report)
-        trajectory = found.trajectory(made.parts.dt).with_scenario(
+        plan = made.plan(report)
+        trajectory = plan.trajectory(made.parts.dt).with_scenario(
             made.resolved(), (), made.surroundings(made.robot())
         )
     if as_json:
         trajectory.save(folder, html=html)
-        said = {
-            "robot": found.robot.name,
-            "duration": found.duration,
-            "end": dict(zip(found.robot.q_names, found.end.tolist(), strict=True)),
-            "stops": found.stops.tolist(),
-            "corners": found.corners.tolist(),
-            "motions": found.motions,
-            "postures": found.postures,
+        summary = {
+            "robot": plan.robot.name,
+            "duration": plan.duration,
+            "end": dict(zip(plan.robot.q_names, plan.end.tolist(), strict=True)),
+            "stops": plan.stops.tolist(),
+            "corners": plan.corners.tolist(),
+            "motions": plan.motions,
+            "postures": plan.postures,
             "folder": str(folder),
         }
-        print(json.dumps(said, indent=1), flush=True)
+        print(json.dumps(summary, indent=1), flush=True)
     else:
         tell_and_save(trajectory, folder, html=html)
-        looked = counted(found.motions, "motion"), counted(found.postures, "configuration")
+        looked = counted(plan.motions, "motion"), counted(plan.postures, "configuration")
         show_table(["", ""], [["looked at", " and ".join(looked)]])
     if play:
         trajectory.play(**browser.keywords())
@@ -167,12 +167,12 @@ def _scenario(subject: str, to: str | None, obstacles: Path | None) -> Scenario:
     return Scenario(document)
 
 
-def _coordinates(given: str, where: str) -> dict[str, str]:
+def _coordinates(assignments: str, where: str) -> dict[str, str]:
     """Numbers, as text, by coordinate, and a posture's name."""
-    found: dict[str, str] = {}
-    for text in names_of(given, where, f"{_FORM}, as in x=6,y=0"):
+    coordinates: dict[str, str] = {}
+    for text in names_of(assignments, where, f"{_FORM}, as in x=6,y=0"):
         name, equals, value = (part.strip() for part in text.partition("="))
-        if not (name and equals and value) or name in found:
+        if not (name and equals and value) or name in coordinates:
             raise InputError(where=where, expected=f"{_FORM}, each once, as in x=6,y=0", got=text)
-        found[name] = value
-    return found
+        coordinates[name] = value
+    return coordinates

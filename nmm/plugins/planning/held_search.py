@@ -87,46 +87,46 @@ class HeldWays:
         self.low, self.high = trees.low.copy(), trees.high.copy()
         self._ended: Counter[int] = Counter()
 
-    def motions(self, here: Array, wanted: Wanted, shorten: int) -> list[SampledMotion]:
-        """From a configuration (n,) that holds it to a pose of the platform; `RunError` for none."""
-        legs = self.way(here, wanted)
+    def motions(self, start: Array, wanted: Wanted, shorten: int) -> list[SampledMotion]:
+        """Motions from start (n,), which holds it, to a pose of the platform; `RunError` for none."""
+        legs = self.way(start, wanted)
         if not len(legs):
             return []
-        shorter = self.shortened(here, legs, shorten // FEWER)
+        shorter = self.shortened(start, legs, shorten // FEWER)
         self.check.kept[:] -= SPARE
-        found = self.timing(here, shorter) or self.timing(here, legs)
-        if found is None:
+        motions = self.timing(start, shorter) or self.timing(start, legs)
+        if motions is None:
             what = "a way was found, on which the arm is too near to where it cannot hold: try another seed"
             raise RunError(what, where="plan")
-        return found
+        return motions
 
-    def way(self, here: Array, wanted: Wanted) -> Array:
+    def way(self, start: Array, wanted: Wanted) -> Array:
         """Legs to a goal, with the margin where such are found in half of the time."""
-        kept = self.check.kept.copy()
+        distances = self.check.kept.copy()
         if self.asked.margin > 0.0:
-            self.check.widen(here[np.newaxis], self.asked.margin)
+            self.check.widen(start[np.newaxis], self.asked.margin)
             self.check.kept[:] += ROUND + SPARE
             with suppress(RunError):
-                return self.way_to(here, self.poses(wanted, here), 0.5 * self.clock())
-            self.check.kept[:] = kept
+                return self.way_to(start, self.poses(wanted, start), 0.5 * self.clock())
+            self.check.kept[:] = distances
         self.check.kept[:] += ROUND + SPARE
-        return self.way_to(here, self.poses(wanted, here), 0.0)
+        return self.way_to(start, self.poses(wanted, start), 0.0)
 
-    def poses(self, wanted: Wanted, here: Array) -> list[Array]:
-        """The platform's coordinates (n_p,) of a goal's alternatives, of those that the arm can hold at."""
+    def poses(self, wanted: Wanted, start: Array) -> list[Array]:
+        """Platform coordinates (n_p,) of those of a goal's alternatives at which the arm can hold."""
         postures = HeldPostures(self.robot, self.low, self.high, self.check, self.asked.tolerance)
-        postures.held, found = self.held, []
-        for one in alternatives(wanted):
-            if not isinstance(one, Mapping) or set(one) != {"x", "y", "theta"}:
+        postures.held, poses = self.held, []
+        for goal in alternatives(wanted):
+            if not isinstance(goal, Mapping) or set(goal) != {"x", "y", "theta"}:
                 expected = "x, y and theta of the platform: the arm goes where it holds"
-                got = ", ".join(map(str, one)) if isinstance(one, Mapping) else one
+                got = ", ".join(map(str, goal)) if isinstance(goal, Mapping) else goal
                 raise InputError(where="plan: goal", expected=expected, got=got)
-            pose = here[: self._first].copy()
-            pose[:3] = self.robot.q(one)[:3]
-            if postures.find(pose, here, self.rng, 1):
-                found.append(pose)
-        if found:
-            return found
+            pose = start[: self._first].copy()
+            pose[:3] = self.robot.q(goal)[:3]
+            if postures.find(pose, start, self.rng, 1):
+                poses.append(pose)
+        if poses:
+            return poses
         if postures.in_the_way:
             raise nothing_found(postures)
         (metres, radians), tried = postures.off, postures.tried
@@ -162,8 +162,8 @@ class HeldWays:
         less time than `least` is left, s."""
         nodes, parents, ways = [start], [-1], [np.zeros((0, 3 + self.robot.n))]
         around = 0.5 * self.robot.reach  # farther aside the arm seldom reaches what it holds
-        self.low[:2] = np.min([start[:2], *(one[:2] for one in poses)], axis=0) - around
-        self.high[:2] = np.max([start[:2], *(one[:2] for one in poses)], axis=0) + around
+        self.low[:2] = np.min([start[:2], *(pose[:2] for pose in poses)], axis=0) - around
+        self.high[:2] = np.max([start[:2], *(pose[:2] for pose in poses)], axis=0) + around
 
         def add(parent: int, pose: Array, most: float) -> tuple[int, bool]:
             legs, end, arrived = self.follow(nodes[parent], pose, most)
@@ -225,7 +225,7 @@ class HeldWays:
             raise RunError(f"{what}: of {self.trees.looked[0]} motions {why}", where="plan")
 
     def shortened(self, start: Array, legs: Array, rounds: int) -> Array:
-        def blocked(here: Array, new: Array, whole: Array) -> int:
+        def blocked(q: Array, new: Array, whole: Array) -> int:
             self.trees.looked[0] += 1
             late = self.clock() < 0.0
             return 0 if late or self.held.along(start, whole, TICK, FAR).ended != ARRIVED else -1
@@ -237,7 +237,7 @@ def refuse_beside_hold(robot: Robot, asked: Asked) -> None:
     """`InputError` for what does not go with holding."""
     if robot.platform.n_p < 3:
         raise InputError(f"{robot.name} stands", where="plan: hold", expected="a platform that moves")
-    moves = any(one.moves for one in asked.collisions.obstacles)
+    moves = any(obstacle.moves for obstacle in asked.collisions.obstacles)
     towed = isinstance(robot.platform, Tractor)
     if asked.smooth or moves or towed:
         what = "trailers" if towed else "smooth" if asked.smooth else "obstacles that move"

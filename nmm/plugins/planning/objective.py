@@ -44,9 +44,9 @@ class SampleCosts:
         program, rows, weights = self._program, self._program.first_rows, self._weights
         H, H_q = np.empty(len(q)), np.empty(q.shape)
         with np.errstate(over="ignore", invalid="ignore"):
-            for k, one in enumerate(q):
-                program.prepare(t, one)
-                run_program(t, one, *program.blocks)
+            for k, sample in enumerate(q):
+                program.prepare(t, sample)
+                run_program(t, sample, *program.blocks)
                 H[k] = weights @ program.buffers.value[rows]
                 H_q[k] = weights @ program.buffers.value_q[rows]
         return H, H_q
@@ -56,8 +56,8 @@ class SampleCosts:
         n = q.shape[1]
         beside = (q[:, np.newaxis] + APART * np.eye(n)).reshape(-1, n)
         with np.errstate(invalid="ignore"):
-            found = (self.at(beside)[1].reshape(-1, n, n) - H_q[:, np.newaxis]) / APART
-        return 0.5 * (found + found.transpose(0, 2, 1))
+            hessian = (self.at(beside)[1].reshape(-1, n, n) - H_q[:, np.newaxis]) / APART
+        return 0.5 * (hessian + hessian.transpose(0, 2, 1))
 
     def write(self, x: Shooting, share: float) -> None:
         """A share of H about the motion, as the problem's squares: its gradient, and its curvature with all

@@ -51,14 +51,14 @@ TELLS = 20.0
 
 
 @compiled
-def place(q: Array, numbers: Array, here: Array, goal: Array) -> tuple[float, float]:
+def place(q: Array, numbers: Array, pose: Array, goal: Array) -> tuple[float, float]:
     """Write the poses of the frame that rolls; returns where it is from the platform's origin, world axes."""
     x, y, turned = numbers[ROLLING], numbers[ROLLING + 1], numbers[ROLLING + 2]
     c, s = math.cos(numbers[GOAL + 2]), math.sin(numbers[GOAL + 2])
     goal[0], goal[1] = numbers[GOAL] + c * x - s * y, numbers[GOAL + 1] + s * x + c * y
     c, s = math.cos(q[2]), math.sin(q[2])
     arm_x, arm_y = c * x - s * y, s * x + c * y
-    here[0], here[1], here[2] = q[0] + arm_x, q[1] + arm_y, q[2] + turned
+    pose[0], pose[1], pose[2] = q[0] + arm_x, q[1] + arm_y, q[2] + turned
     goal[2] = numbers[GOAL + 2] + turned
     return arm_x, arm_y
 
@@ -68,39 +68,39 @@ def write_way(rows: Rows, q: Array, numbers: Array, wanted: float, least: float)
     """The first row: gain K drives K × wanted along the way, m, and the error is how far the goal is."""
     apart = math.hypot(q[0] - numbers[GOAL], q[1] - numbers[GOAL + 1])
     far = max(apart, abs(wrapped(q[2] - numbers[GOAL + 2])), least)
-    told = min(max(far / abs(wanted), 1.0), TELLS) if wanted != 0.0 else 1.0
-    rows.value[0] = -told * wanted
+    factor = min(max(far / abs(wanted), 1.0), TELLS) if wanted != 0.0 else 1.0
+    rows.value[0] = -factor * wanted
     for k in range(3):
-        rows.value_q[0, k] *= told
+        rows.value_q[0, k] *= factor
 
 
 @kernel(FUNCTION)
 def park_turning(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     """The law in polar coordinates: v = K e cos α, ω = K (TURNING α + cos α sin α / α (α + PULL θ)), e and α
     the distance and bearing of the goal, θ its bearing from its own axis; within `within` it only turns."""
-    here, goal = scratch(3), scratch(3)
-    arm_x, arm_y = place(at.q, numbers, here, goal)
-    x, y = goal[0] - here[0], goal[1] - here[1]
-    ahead, turn, distance = 0.0, wrapped(goal[2] - here[2]), math.hypot(x, y)
+    pose, goal = scratch(3), scratch(3)
+    arm_x, arm_y = place(at.q, numbers, pose, goal)
+    x, y = goal[0] - pose[0], goal[1] - pose[1]
+    ahead, turn, distance = 0.0, wrapped(goal[2] - pose[2]), math.hypot(x, y)
     if distance > numbers[WITHIN]:
         bearing = math.atan2(y, x)
-        alpha, theta = wrapped(bearing - here[2]), wrapped(bearing - goal[2])
+        alpha, theta = wrapped(bearing - pose[2]), wrapped(bearing - goal[2])
         slope = math.sin(alpha) / alpha if alpha != 0.0 else 1.0
         ahead = distance * math.cos(alpha)
         turn = alpha + math.cos(alpha) * slope * (alpha + PULL * theta) / TURNING
-    c, s = math.cos(here[2]), math.sin(here[2])
+    c, s = math.cos(pose[2]), math.sin(pose[2])
     rows.value_q[0, 0], rows.value_q[0, 1], rows.value_q[0, 2] = c, s, s * arm_x - c * arm_y
     write_way(rows, at.q, numbers, ahead, 0.0)
     rows.value[1], rows.value_q[1, 2] = -turn, 1.0 / TURNING
 
 
 @compiled
-def new_word(numbers: Array, here: Array, goal: Array) -> None:
-    """Remember the shortest word from here to the goal."""
+def new_word(numbers: Array, pose: Array, goal: Array) -> None:
+    """Remember the shortest word from the pose to the goal."""
     radius, word = numbers[RADIUS], scratch((PARTS, 2))
-    c, s = math.cos(here[2]), math.sin(here[2])
-    x, y = (goal[0] - here[0]) / radius, (goal[1] - here[1]) / radius
-    reeds_shepp(c * x + s * y, c * y - s * x, wrapped(goal[2] - here[2]), word)
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    x, y = (goal[0] - pose[0]) / radius, (goal[1] - pose[1]) / radius
+    reeds_shepp(c * x + s * y, c * y - s * x, wrapped(goal[2] - pose[2]), word)
     count = 0
     for i in range(PARTS):
         if word[i, 1] != 0.0 or (i == PARTS - 1 and count == 0):
@@ -108,7 +108,7 @@ def new_word(numbers: Array, here: Array, goal: Array) -> None:
             count += 1
     numbers[COUNT], numbers[PART] = count, 0.0
     for k in range(3):
-        numbers[BASE + k] = here[k]
+        numbers[BASE + k] = pose[k]
 
 
 @compiled
@@ -125,11 +125,11 @@ def next_part(numbers: Array) -> None:
 
 
 @compiled
-def beside(numbers: Array, here: Array, off: Array) -> None:
+def beside(numbers: Array, pose: Array, off: Array) -> None:
     """off = [how far along the present part, to its left, turned off it]."""
     i = int(numbers[PART])
     c, s = math.cos(numbers[BASE + 2]), math.sin(numbers[BASE + 2])
-    x, y, turn = here[0] - numbers[BASE], here[1] - numbers[BASE + 1], here[2] - numbers[BASE + 2]
+    x, y, turn = pose[0] - numbers[BASE], pose[1] - numbers[BASE + 1], pose[2] - numbers[BASE + 2]
     off[0], off[1], off[2] = c * x + s * y, c * y - s * x, turn
     if numbers[TURNS + i] != 0.0:
         side, radius = numbers[TURNS + i], numbers[RADIUS] / numbers[TURNS + i]
@@ -158,20 +158,20 @@ def ahead_of(numbers: Array, along: float) -> tuple[float, float, float]:
 def park_car(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     """The law that follows a word, which it remembers; the second row is the steering's, whose angle is that
     of the word's curvature and of what leads back to the word."""
-    here, goal, off = scratch(3), scratch(3), scratch(3)
-    arm_x, arm_y = place(at.q, numbers, here, goal)
+    pose, goal, off = scratch(3), scratch(3), scratch(3)
+    arm_x, arm_y = place(at.q, numbers, pose, goal)
     radius, within, most = numbers[RADIUS], numbers[WITHIN], numbers[MOST]
     way, run, rest, ell, own, more = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for attempt in range(2):
         if numbers[COUNT] == 0.0:
-            new_word(numbers, here, goal)
-        beside(numbers, here, off)
+            new_word(numbers, pose, goal)
+        beside(numbers, pose, off)
         while numbers[STANDS] == 0.0 and numbers[PART] < numbers[COUNT] - 1.0:
             length = numbers[LENGTHS + int(numbers[PART])]
             if abs(length) > (off[0] if length > 0.0 else -off[0]):
                 break
             next_part(numbers)
-            beside(numbers, here, off)
+            beside(numbers, pose, off)
         way, run, rest = ahead_of(numbers, off[0])
         if rest == 0.0 and run < 0.0:  # beyond the goal
             way = -way
@@ -187,7 +187,7 @@ def park_car(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     bent = min(max(own + more, -most), most)
     # At its widest the angle follows the word no further: limits would stop the car with it.
     follows = bent == own + more and abs(math.tan(at.q[steering])) < wheelbase * most
-    tangent = here[2] - off[2]
+    tangent = pose[2] - off[2]
     c, s = math.cos(tangent), math.sin(tangent)
     for k in range(3):
         x, y = (-arm_y, arm_x) if k == 2 else ((1.0, 0.0) if k == 0 else (0.0, 1.0))
@@ -244,8 +244,8 @@ class Parking(Function):
     """
 
     def __init__(self, x: float = 0.0, y: float = 0.0, theta: float = 0.0, within: float = 0.0005) -> None:
-        given = (("x", x), ("y", y), ("theta", theta))
-        self.x, self.y, self.theta = (scalar(value, f"parking: {name}") for name, value in given)
+        coordinates = (("x", x), ("y", y), ("theta", theta))
+        self.x, self.y, self.theta = (scalar(value, f"parking: {name}") for name, value in coordinates)
         self.within = scalar(within, "parking: within", above=0.0)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:

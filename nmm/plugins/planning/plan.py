@@ -167,7 +167,7 @@ class Plan:
         True
         """
         scene, tube = self.found.scene, Goal(m=0.1, rad=0.2) if tube is None else tube
-        if scene is not None and pace != 1.0 and any(one.moves for one in scene.obstacles):
+        if scene is not None and pace != 1.0 and any(obstacle.moves for obstacle in scene.obstacles):
             raise InputError(
                 "obstacles that move do not wait", where="plan: pace", expected="pace=1", got=pace
             )
@@ -192,8 +192,8 @@ class Plan:
             other = self if replan is None else replan(self, q)
             return other._followed(gain, length, pace, tube, replan)
 
-        given = self.robot, at, self.stops / share, gain, length, tube
-        return FromPlan(*given, None if replan is None else anew)
+        arguments = self.robot, at, self.stops / share, gain, length, tube
+        return FromPlan(*arguments, None if replan is None else anew)
 
     def trajectory(self, dt: float = 0.02) -> Trajectory:
         """The motion sampled every dt, s, and at its end, as a run: it plays, saves and compares. Its task is
@@ -203,5 +203,5 @@ class Plan:
         task = goal_task(self.robot, self.found.goal, self.end)
         (q, u), objective = self(t), self.found.asked.objective
         H = None if objective is None else SampleCosts(self.robot, objective).at(q)[0]
-        kept = self.found.limits, self.found.scene
-        return recorded(self.robot, t, q, u, dt, task, *kept, "plan", H=H)
+        constraints = self.found.limits, self.found.scene
+        return recorded(self.robot, t, q, u, dt, task, *constraints, "plan", H=H)

@@ -125,9 +125,9 @@ def plan(
     smooth = smooth or isinstance(robot.platform, Tractor)
     if objective is not None and not smooth:
         raise InputError("smooth motions alone have one", where="plan: objective", expected="smooth=True")
-    kept = collisions or Collisions()
+    settings = collisions or Collisions()
     asked = Asked(
-        collisions=replace(kept, obstacles=(*kept.obstacles, *obstacles)),
+        collisions=replace(settings, obstacles=(*settings.obstacles, *obstacles)),
         limits=limits,
         tolerance=tolerance or Goal(),
         smooth=smooth,
@@ -148,12 +148,12 @@ def planned(search: Search, seconds: float, shorten: int, progress: Callable[[fl
     if search.asked.hold is not None:
         return _holding(search, search.asked.hold, shorten, begin)
     begin()
-    here, parts, least = search.start, [], search.asked_kept + search.asked.margin
+    q, parts, least = search.start, [], search.asked_kept + search.asked.margin
     for wanted in search.goals:
         search.keep_asked()
-        legs = search.shortened(here, search.farther(here, search.ends(wanted, here)), shorten)
+        legs = search.shortened(q, search.farther(q, search.ends(wanted, q)), shorten)
         parts.append(legs)
-        here, least = search.guide.corners(here, legs)[-1], np.minimum(least, search.check.kept)
+        q, least = search.guide.corners(q, legs)[-1], np.minimum(least, search.check.kept)
     search.check.kept[:] = least
     return finished(search, *parts)
 
@@ -184,7 +184,7 @@ def _waited(search: Search, path: TimedLegs, movers: Scene) -> TimedLegs:
             search.tree = other.tree if timing is not None else search.tree
             ways, looked = ways + 1, looked + more
     if timing is None:
-        names = few(sorted({one.name for one in movers.obstacles}))
+        names = few(sorted({obstacle.name for obstacle in movers.obstacles}))
         tried = f"{ways} way{'s'[: ways > 1]} and {looked} timings of their parts looked at"
         raise RunError(f"{tried}: none keeps its distance of {names}", where="plan")
     return timing
@@ -192,12 +192,14 @@ def _waited(search: Search, path: TimedLegs, movers: Scene) -> TimedLegs:
 
 def _another_way(search: Search, at: float | None, k: int, seconds: float) -> Found:
     """The way of another seed, with what moves standing where it is at a time, s; without it at None."""
-    given = search.asked.collisions
-    kept = [one for one in given.obstacles if not one.moves]
+    collisions = search.asked.collisions
+    standing = [obstacle for obstacle in collisions.obstacles if not obstacle.moves]
     if at is not None:
-        moves = [one for one in given.obstacles if one.moves]
-        kept += [Obstacle(one.shape, one.placement(at), name=one.name) for one in moves]
-    asked = replace(search.asked, collisions=replace(given, obstacles=tuple(kept)), smooth=False)
+        moves = [obstacle for obstacle in collisions.obstacles if obstacle.moves]
+        standing += [
+            Obstacle(obstacle.shape, obstacle.placement(at), name=obstacle.name) for obstacle in moves
+        ]
+    asked = replace(search.asked, collisions=replace(collisions, obstacles=tuple(standing)), smooth=False)
     other = Search(search.robot, search.start, search.goals, asked, search.seed + k)
     return planned(other, seconds, SHORTEN, None).found
 
@@ -205,16 +207,16 @@ def _another_way(search: Search, at: float | None, k: int, seconds: float) -> Fo
 def _smoothed(search: Search, parts: Sequence[Array]) -> SampledMotion | None:
     """The parts as smooth motions with rests between them; None where one of them is not found."""
     smoothing = Smoothing(search.robot, search.limits, USUAL, search.check, search.costs)
-    found, here = [], search.start
+    motions, q = [], search.start
     for legs in parts:
-        path = _timed(search, here, legs)
-        here = path.corners[-1]
+        path = _timed(search, q, legs)
+        q = path.corners[-1]
         if path.duration > 0.0:
             motion = smoothing(path)
             if motion is None:
                 return None
-            found.append(_within_efforts(search, motion))
-    return joined(found) if found else None
+            motions.append(_within_efforts(search, motion))
+    return joined(motions) if motions else None
 
 
 def _towed(search: Search, tractor: Tractor, begin: Callable[[], None]) -> Plan:
@@ -222,30 +224,30 @@ def _towed(search: Search, tractor: Tractor, begin: Callable[[], None]) -> Plan:
     robot = search.robot
     if search.movers is not None:
         raise InputError("a tractor with trailers waits for none that move", where="plan: obstacles")
-    given = robot, search.limits, USUAL, search.check, search.low, search.high, search.seed, search.left
-    towing = Towing(*given, search.costs)
+    arguments = robot, search.limits, USUAL, search.check, search.low, search.high, search.seed, search.left
+    towing = Towing(*arguments, search.costs)
     begin()
-    hitches, here, found = {one.joint for one in tractor.trailers}, search.start, []
+    hitches, q, motions = {trailer.joint for trailer in tractor.trailers}, search.start, []
     for wanted in search.goals:
         search.keep_asked()
-        ends, named = search.ends(wanted, here), _named(robot, wanted)
-        if any(np.array_equal(here, end) for end in ends):
+        ends, named = search.ends(wanted, q), _named(robot, wanted)
+        if any(np.array_equal(q, end) for end in ends):
             continue
-        find = partial(towing, here, ends, loose=named is not None and not hitches & named)
-        motion = search.with_margin(find, here, ends)
-        found.append(_within_efforts(search, motion))
-        here = motion.corners[-1]
-    whole = joined(found) if found else _still(search, here)
+        find = partial(towing, q, ends, loose=named is not None and not hitches & named)
+        motion = search.with_margin(find, q, ends)
+        motions.append(_within_efforts(search, motion))
+        q = motion.corners[-1]
+    whole = joined(motions) if motions else _still(search, q)
     return _plan(search, whole, towing.motions, towing.configurations)
 
 
 def _named(robot: Robot, wanted: object) -> set[str] | None:
     """The coordinates that goals name, and their postures; None where one of them is no goal by name."""
     named: set[str] = set()
-    for one in alternatives(wanted):
-        if not isinstance(one, Mapping):
+    for goal in alternatives(wanted):
+        if not isinstance(goal, Mapping):
             return None
-        named |= {*one, *robot.postures.get(str(one.get("posture")), {})}
+        named |= {*goal, *robot.postures.get(str(goal.get("posture")), {})}
     return named
 
 
@@ -257,13 +259,13 @@ def _holding(search: Search, hold: Task | str, shorten: int, begin: Callable[[],
     timing = HeldTiming(held, search.guide, search.limits, search.usual)
     ways = HeldWays(asked, timing, search.trees, search.rng, search.left)
     begin()
-    here, motions = search.start, list[SampledMotion]()
+    q, motions = search.start, list[SampledMotion]()
     for wanted in search.goals:
         search.keep_asked()
-        motions += ways.motions(here, wanted, shorten)
-        here = motions[-1].corners[-1] if motions else here
-    motions = [_within_efforts(search, one) for one in motions]
-    return _found(search, joined(motions) if motions else _still(search, here))
+        motions += ways.motions(q, wanted, shorten)
+        q = motions[-1].corners[-1] if motions else q
+    motions = [_within_efforts(search, motion) for motion in motions]
+    return _found(search, joined(motions) if motions else _still(search, q))
 
 
 def _timed(search: Search, start: Array, legs: Array) -> TimedLegs:
@@ -286,5 +288,5 @@ def _found(search: Search, motion: Motion) -> Plan:
 
 
 def _plan(search: Search, motion: Motion, motions: int, postures: int) -> Plan:
-    found = Found(motion, search.limits, search.scene, search.goals[-1], search.asked, search.tree)
-    return Plan(search.robot, motions, postures, found)
+    result = Found(motion, search.limits, search.scene, search.goals[-1], search.asked, search.tree)
+    return Plan(search.robot, motions, postures, result)

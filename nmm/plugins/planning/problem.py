@@ -42,7 +42,7 @@ def steps_within(robot: Robot, q: Array, u: Array, step: float) -> float:
     """How many steps the platform's integration needs in a sample of a motion q (N + 1, n), u (N + 1, m)."""
     needed = float(np.abs(np.diff(q[:, 2 : robot.platform.n_p], axis=0)).max(initial=0.0)) / TURN
     if isinstance(robot.platform, Tractor):
-        shortest = min(one.length for one in robot.platform.trailers)
+        shortest = min(trailer.length for trailer in robot.platform.trailers)
         needed = max(needed, step * float(np.abs(u[:, 0]).max()) / (TOWED * shortest))
     return needed
 
@@ -55,13 +55,13 @@ def shooting_problem(
     q: Array,
     u: Array,
     step: float,
-    given: bool,
+    fixed_end: bool,
     aims: int = 0,
     movers: Sequence[int] = (),
 ) -> Shooting:
     """The problem, with a motion to begin with: q (N + 1, n) and u (N + 1, m) every step, s. top (m, 2) : of
-    inputs; given : whether it ends where the motion does; aims : rows of the cost, of zeros; movers : shapes
-    that move."""
+    inputs; fixed_end : whether it ends where the motion does; aims : rows of the cost, of zeros; movers :
+    shapes that move."""
     zeros = np.zeros
     n, m, N = robot.n, robot.n_u, len(q) - 1
     hardest = np.abs(limits.changes).max(axis=1)
@@ -84,13 +84,13 @@ def shooting_problem(
     sign = np.where(side == 0, 1.0, -1.0)
     largest = np.abs(top).max(axis=1)
     hardest = np.where(np.isfinite(hardest), hardest, 10.0 * largest)
-    scene, kept = check.scene, check.kept
+    scene, distances = check.scene, check.kept
     spare = zeros(0)
     if scene is not None:
-        pairs = range(len(kept))
-        apart = np.minimum(*(scene.queries.distances(0.0, one, pairs) for one in q[[0, -1]]))
-        spare = np.maximum(0.5 * (apart - kept), 0.0)
-    R = len(column) + 2 * len(limits.spin) + len(kept)
+        pairs = range(len(distances))
+        apart = np.minimum(*(scene.queries.distances(0.0, end, pairs) for end in q[[0, -1]]))
+        spare = np.maximum(0.5 * (apart - distances), 0.0)
+    R = len(column) + 2 * len(limits.spin) + len(distances)
     return Shooting(
         inputs=inputs_of(robot),
         step=np.array(step),
@@ -102,16 +102,16 @@ def shooting_problem(
         spin=WITHIN * limits.spin,
         weights=np.concatenate([EFFORT / largest**2, 1.0 / hardest**2]),
         goal=q[-1],
-        ends=END * np.concatenate([np.full(n, float(given)), np.ones(m)]),
+        ends=END * np.concatenate([np.full(n, float(fixed_end)), np.ones(m)]),
         aims=zeros((N + 1, aims, n)),
         aimed=zeros((N + 1, aims)),
         pull=zeros((N + 1, aims)),
         movers=np.array(movers, dtype=np.int64),
         tracks=zeros((N + 1, len(movers), 12)),
-        drift=zeros((N, len(kept))),
+        drift=zeros((N, len(distances))),
         room=spare,
         margin=np.full(N + 1, MARGIN),
-        loose=np.array(0.0 if given else 0.5 * MARGIN),
+        loose=np.array(0.0 if fixed_end else 0.5 * MARGIN),
         q=q,
         u=u,
         a=np.diff(u, axis=0) / step,

@@ -36,10 +36,10 @@ def recorded(
     H: Array | None = None,
 ) -> Trajectory:
     """The run that was at q (N, n) with u (N, n_u) at t (N,), s, every dt; H (N,) : of an objective."""
-    S = np.array([robot.S(one) for one in q])
+    S = np.array([robot.S(row) for row in q])
     rows, drawn, seen = task.rows(robot), shown_frame([task], robot), SeenPoints([task], None, robot)
-    found = map(np.array, zip(*map(TaskError(robot, task).evaluate, q, t.tolist()), strict=True))
-    r, r_d, error, error_q = found
+    evaluated = map(np.array, zip(*map(TaskError(robot, task).evaluate, q, t.tolist()), strict=True))
+    r, r_d, error, error_q = evaluated
     names, within = shares(limits, robot, q, u, np.zeros((len(t), 0)))
     distances: dict[str, Any] = {}
     if scene is not None:

@@ -59,23 +59,23 @@ class Search:
         self.costs = None
         if asked.smooth and asked.objective is not None:
             self.costs = SampleCosts(robot, asked.objective)
-        self.efforts, given = efforts_of(robot, asked.effort), asked.collisions
-        known = bool(given.obstacles) or len(robot.collision_model.collisionPairs) > 0
-        self.scene = given.on(robot) if known else None
-        movers, scene = [one for one in given.obstacles if one.moves], self.scene
+        self.efforts, collisions = efforts_of(robot, asked.effort), asked.collisions
+        known = bool(collisions.obstacles) or len(robot.collision_model.collisionPairs) > 0
+        self.scene = collisions.on(robot) if known else None
+        movers, scene = [obstacle for obstacle in collisions.obstacles if obstacle.moves], self.scene
         self.movers = None
         if movers:  # the way is looked for among what stands, and its timing among what moves
-            self.movers = replace(given, obstacles=movers, self_collisions=False).on(robot)
-            stands = [one for one in given.obstacles if not one.moves]
-            own = given.self_collisions and len(robot.collision_model.collisionPairs) > 0
-            scene = replace(given, obstacles=stands).on(robot) if stands or own else None
+            self.movers = replace(collisions, obstacles=movers, self_collisions=False).on(robot)
+            stands = [obstacle for obstacle in collisions.obstacles if not obstacle.moves]
+            own = collisions.self_collisions and len(robot.collision_model.collisionPairs) > 0
+            scene = replace(collisions, obstacles=stands).on(robot) if stands or own else None
         self.limits = asked.limits.on(robot)
         self.usual = usual_speeds(robot, self.limits)
         speeds, reverses = leg_speeds(robot, self.limits, self.usual), self.limits.inputs[:1, 0] < 0.0
         ways = ways_of(
             robot, speeds, pause_between(self.limits), bool(np.all(reverses)), self.limits.coordinates
         )
-        self.low, self.high = drawn_within(robot, start, goals, given.obstacles)
+        self.low, self.high = drawn_within(robot, start, goals, collisions.obstacles)
         trees = Trees(
             ways=ways,
             low=self.low,
@@ -95,16 +95,16 @@ class Search:
         self._search = checked_by_caller(tree.search, tree.SEARCH)
 
     def farther(
-        self, here: Array, ends: Sequence[Array], ahead: Sequence[Array] = (), behind: Sequence[Array] = ()
+        self, start: Array, ends: Sequence[Array], ahead: Sequence[Array] = (), behind: Sequence[Array] = ()
     ) -> Array:
         """A `way` that keeps the margin, too, where one is found in half of the time."""
-        return self.with_margin(partial(self.way, here, ends, ahead, behind), here, ends)
+        return self.with_margin(partial(self.way, start, ends, ahead, behind), start, ends)
 
-    def with_margin(self, find: Callable[[], T], here: Array, ends: Sequence[Array]) -> T:
-        """What is found with the margin kept between these (n,) in half of the time, or else without."""
+    def with_margin(self, find: Callable[[], T], start: Array, ends: Sequence[Array]) -> T:
+        """What `find` returns, with the margin between these (n,) in half of the time, or else without."""
         if self.asked.margin > 0.0:
             last, self._ends = self._ends, 0.5 * (time.monotonic() + self._ends)
-            self.widen(here, *ends)
+            self.widen(start, *ends)
             with suppress(RunError):
                 return find()
             self._ends = last
@@ -143,8 +143,8 @@ class Search:
         """Shorter legs from a configuration."""
         first = 3 + (0 if self.robot.platform.n_p < 3 else self.robot.platform.n_p)
 
-        def blocked(here: Array, new: Array, whole: Array) -> int:
-            return self.blocked(here, new)
+        def blocked(q: Array, new: Array, whole: Array) -> int:
+            return self.blocked(q, new)
 
         return shortened(self.guide, blocked, start, legs, rounds, self.rng, first)
 
@@ -153,26 +153,26 @@ class Search:
         self.trees.looked[0] += 1
         return self.check.blocked(start, legs)
 
-    def ends(self, wanted: object, here: Array) -> list[Array]:
+    def ends(self, wanted: object, start: Array) -> list[Array]:
         """Free configurations (n,) that reach a goal."""
         postures = GoalPostures(self.robot, self.low, self.high, self.check, self.asked.tolerance)
-        found = [q for one in alternatives(wanted) for q in postures.find(one, here, self.rng)]
-        if not found:
+        configurations = [q for goal in alternatives(wanted) for q in postures.find(goal, start, self.rng)]
+        if not configurations:
             raise nothing_found(postures)
-        return [self.near(q, here) for q in found]
+        return [self.near(q, start) for q in configurations]
 
-    def near(self, q: Array, here: Array) -> Array:
+    def near(self, q: Array, start: Array) -> Array:
         """The same posture with its joints the short way round from a configuration (n,)."""
         turns, robot = self.robot.turns(self.limits.coordinates), self.robot
         turns[: robot.platform.n_p] = 0.0
         full = 2.0 * np.pi
-        return np.asarray(q - full * turns * np.round((q - here)[robot.own_or_leader] / full))
+        return np.asarray(q - full * turns * np.round((q - start)[robot.own_or_leader] / full))
 
     def way(
         self, start: Array, goals: Sequence[Array], ahead: Sequence[Array] = (), behind: Sequence[Array] = ()
     ) -> Array:
-        """Legs from a configuration to one of these, found at once or by search. Free ways are known from it
-        through those `ahead`, one after the other, and from those `behind` to the first goal."""
+        """Legs from start (n,) to one of the goals (n,), directly or by search. Free ways are known from the
+        start through those `ahead`, one after the other, and from those `behind` to the first goal."""
         for goal in goals:
             legs = self.guide.way(start, goal)
             if self.blocked(start, legs) < 0:
@@ -187,12 +187,12 @@ class Search:
             trees.parents[k, len(roots) : count] = [0, *range(len(roots), count - 1)][: len(chain)]
         scratch = np.zeros((LEGS, 3 + self.robot.n))
         while True:
-            found = self._search(*self.check.blocks, ROUNDS, scratch)
+            outcome = self._search(*self.check.blocks, ROUNDS, scratch)
             left = self.left()
-            if found > 0:
+            if outcome > 0:
                 break
-            if found < 0 or left < 0.0:
-                what = "no room for more configurations" if found < 0 else f"{self._seconds:g} s"
+            if outcome < 0 or left < 0.0:
+                what = "no room for more configurations" if outcome < 0 else f"{self._seconds:g} s"
                 raise RunError(
                     f"no way found in {what}: {trees.looked[1]} configurations and {trees.looked[0]} motions "
                     "looked at",

@@ -74,11 +74,11 @@ def drawn_within(
             middle = place.act(geometry.aabb_center)[:2]
             points += [middle - radius, middle + radius]
         for wanted in goals:
-            for one in alternatives(wanted):
-                if isinstance(one, Mapping) and {"x", "y"} <= one.keys():
-                    points.append(np.array([one["x"], one["y"]], dtype=np.float64))
-                elif not isinstance(one, Mapping | Task):
-                    points.append(robot.q(one)[:2])
+            for goal in alternatives(wanted):
+                if isinstance(goal, Mapping) and {"x", "y"} <= goal.keys():
+                    points.append(np.array([goal["x"], goal["y"]], dtype=np.float64))
+                elif not isinstance(goal, Mapping | Task):
+                    points.append(robot.q(goal)[:2])
         around = AROUND + 2.0 * robot.reach
         low[:2], high[:2] = np.min(points, axis=0) - around, np.max(points, axis=0) + around
         low[2], high[2] = -np.pi, np.pi

@@ -72,35 +72,35 @@ class Smoothing:
         None where none is found that keeps everything."""
         self.begin(path)
         x = self.x
-        kept: list[Array] = []
+        stored: list[Array] = []
         best: SampledMotion | None = None
         share = 1.0
         while self._left > 0:
             if self.solved(FIRST if best is None else ROUNDS):
                 self._quicken(self._spare())
                 best = self._motion()
-                kept = [one.copy() for one in (x.q, x.u, x.a, x.step)]
+                stored = [values.copy() for values in (x.q, x.u, x.a, x.step)]
                 share = FASTER
             elif best is None or share == LESS:
                 break
             else:
-                self._restore(kept)
+                self._restore(stored)
                 share = LESS
             self._quicken(share)
         if best is None or not (rough or best.duration < path.duration):
             return None
-        return best if self.costs is None else self._lowered(self.costs, kept) or best
+        return best if self.costs is None else self._lowered(self.costs, stored) or best
 
-    def _restore(self, kept: Sequence[Array]) -> None:
+    def _restore(self, stored: Sequence[Array]) -> None:
         x = self.x
-        for one, before in zip((x.q, x.u, x.a, x.step), kept, strict=True):
-            one[...] = before
+        for values, before in zip((x.q, x.u, x.a, x.step), stored, strict=True):
+            values[...] = before
 
-    def _lowered(self, costs: SampleCosts, kept: Sequence[Array]) -> SampledMotion | None:
-        """A motion as long as the one kept, with less of an objective; None where none keeps everything."""
-        x, least, margin = self.x, costs.at(kept[0])[0].mean(), self.x.margin.copy()
+    def _lowered(self, costs: SampleCosts, stored: Sequence[Array]) -> SampledMotion | None:
+        """A motion as long as the stored one, with less of an objective; None where none keeps everything."""
+        x, least, margin = self.x, costs.at(stored[0])[0].mean(), self.x.margin.copy()
         for share in SHARES:
-            self._restore(kept)
+            self._restore(stored)
             x.margin[:], x.s[:], x.z[:], x.duals[:], x.mu[()] = margin, 0.0, 0.0, 0.0, BEGIN
             for k in range(LONGEST):
                 costs.write(x, share)
@@ -118,8 +118,8 @@ class Smoothing:
         q, u = path.at(np.linspace(0.0, path.duration, N + 1))
         u[0] = u[-1] = 0.0
         memory = Memory()
-        given, aims = (self.robot, self.limits, self.top, self.check), 0 if self.costs is None else len(q[0])
-        memory.add(shooting_problem(*given, q, u, path.duration / N, True, aims))
+        setup, aims = (self.robot, self.limits, self.top, self.check), 0 if self.costs is None else len(q[0])
+        memory.add(shooting_problem(*setup, q, u, path.duration / N, True, aims))
         self._own = memory.blocks()
         self.x = views(Shooting, *self._own, 0)
         self._left = ALL

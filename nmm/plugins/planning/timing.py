@@ -54,7 +54,7 @@ class TimedLegs:
         ramp = V / A
         to_end = np.maximum(length - after, 0.0)
         rising, falling = after < ramp, to_end < V / B
-        A, B = (np.where(np.isfinite(one), one, 0.0) for one in (A, B))
+        A, B = (np.where(np.isfinite(values), values, 0.0) for values in (A, B))
         share = V * (after - 0.5 * ramp)
         share = np.where(rising, 0.5 * A * after**2, np.where(falling, 1.0 - 0.5 * B * to_end**2, share))
         rate = np.where(rising, A * after, np.where(falling, B * to_end, V))
@@ -76,8 +76,8 @@ def timed(guide: Guide, robot: Robot, start: Array, legs: Array, limits: LimitsO
         spins = np.maximum(*(spins_of(robot, q, inputs, limits) for q in (corners[:-1], corners[1:])))
         speed = np.minimum(speed, np.min(limits.spin / spins, axis=1, initial=np.inf))
         acceleration, braking = (
-            np.min(one / np.abs(inputs), axis=1, initial=np.inf)
-            for one in (np.where(forwards, rising, falling), np.where(forwards, falling, rising))
+            np.min(change / np.abs(inputs), axis=1, initial=np.inf)
+            for change in (np.where(forwards, rising, falling), np.where(forwards, falling, rising))
         )
         # Too short to reach its speed: first faster, then slower.
         slow = 1.0 / acceleration + 1.0 / braking
@@ -91,7 +91,7 @@ def timed(guide: Guide, robot: Robot, start: Array, legs: Array, limits: LimitsO
 
 def spins_of(robot: Robot, q: Array, inputs: Array, limits: LimitsOn) -> Array:
     """How far limited wheels turn on each leg, (L, w), rad: at q (L, n), where it begins or ends."""
-    ways = np.array([robot.S(one) @ u for one, u in zip(q, inputs, strict=True)]).reshape(-1, robot.n)
+    ways = np.array([robot.S(corner) @ u for corner, u in zip(q, inputs, strict=True)]).reshape(-1, robot.n)
     names, rates = turning_wheels(robot, q, ways)
     return np.abs(rates[:, [names.index(name) for name in limits.rows[: len(limits.spin)]]])
 

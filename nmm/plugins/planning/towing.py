@@ -126,7 +126,7 @@ class Towing:
         n, count = robot.n, len(self.tractor.trailers)
         folds = limits.coordinates[3 : 3 + count]
         radius = least_radius(self.tractor, folds)
-        train = sum(abs(one.hitch) + one.length for one in self.tractor.trailers)
+        train = sum(abs(trailer.hitch) + trailer.length for trailer in self.tractor.trailers)
         around = np.array([AROUND * train, AROUND * train, 0.0])
         memory = Memory()
         memory.add(
@@ -237,11 +237,11 @@ class Towing:
 
     def _chain(self, tree: int) -> list[int]:
         """The nodes of a tree from where both met to its root, without that."""
-        found, node = [], int(self.trains.met[tree])
+        nodes, node = [], int(self.trains.met[tree])
         while (parent := int(self.trains.parents[tree, node])) >= 0:
-            found.append(node)
+            nodes.append(node)
             node = parent
-        return found
+        return nodes
 
     def _along(self, q: Array, motion: Array) -> tuple[Array, Array]:
         """Configurations (K + 1, n) along a motion (DRIVEN, 2) from q, and lengths between them (K,), m."""

@@ -49,9 +49,9 @@ class Drive(NamedTuple):
 
 
 def waited(path: TimedLegs, robot: Robot, scene: Scene) -> tuple[TimedLegs | None, int]:
-    """The path as soon as may be, without coming too near to the obstacles of a scene, which move; None where
-    no timing is found. At its end it may stay for as long as is looked at. And how many timings of drives
-    between two places to rest were looked at."""
+    """The path in the earliest timing that keeps its distance of a scene's moving obstacles, at its end for
+    as long as is looked ahead, or None where there is none; and how many timings of drives between two places
+    to rest were looked at."""
     looked = 0
     if not len(path.legs):
         return path, looked
@@ -68,9 +68,12 @@ def waited(path: TimedLegs, robot: Robot, scene: Scene) -> tuple[TimedLegs | Non
     K = rooms.count
     taken = [
         np.array(
-            [rooms.taken(_at(path, k, 0.5 * (a + b)), 0.5 * (b - a) * path.legs[k]) for a, b in pairwise(one)]
+            [
+                rooms.taken(_at(path, k, 0.5 * (a + b)), 0.5 * (b - a) * path.legs[k])
+                for a, b in pairwise(shares)
+            ]
         )
-        for k, one in cells
+        for k, shares in cells
     ]
     still = [rooms.taken(_at(path, *rest), 0.0 * path.legs[0]) for rest in rests]
     reached = np.zeros((len(rests), K + 1), dtype=bool)
@@ -96,12 +99,12 @@ def _at(path: TimedLegs, leg: int, share: float) -> Array:
 
 
 def _drives(path: TimedLegs, cells: list[tuple[int, Array]], i: int) -> Iterator[tuple[int, Drive]]:
-    """Where a drive from the place i can end, and it."""
+    """Drives from the place i, each with the place where it ends."""
     j = i
     while j < len(cells) and cells[j][0] == cells[i][0]:
         j += 1
         leg, a, b = cells[i][0], cells[i][1][0], cells[j - 1][1][-1]
-        borders = np.concatenate([cells[i][1], *(one[1:] for _, one in cells[i + 1 : j])]) - a
+        borders = np.concatenate([cells[i][1], *(shares[1:] for _, shares in cells[i + 1 : j])]) - a
         V, A, B = float(path.speed[leg]), float(path.acceleration[leg]), float(path.braking[leg])
         way = float(b - a)
         V = min(V, np.sqrt(2.0 * way / (1.0 / A + 1.0 / B)) if np.isfinite(min(A, B)) else np.inf)
@@ -136,11 +139,11 @@ def _timing(
         share = drive.b - drive.a
         legs, inputs = share * path.legs[drive.leg], share * path.inputs[drive.leg]
         speed, acceleration, braking = (
-            one / share for one in (drive.speed, drive.acceleration, drive.braking)
+            rate / share for rate in (drive.speed, drive.acceleration, drive.braking)
         )
         rows.append((legs, inputs, speed, acceleration, braking, arrives))
         i, k, end = i_before, begun, begun * STEP
-    legs, inputs, fast, rises, falls, stops = (np.array(one) for one in zip(*rows[::-1], strict=True))
+    legs, inputs, fast, rises, falls, stops = (np.array(column) for column in zip(*rows[::-1], strict=True))
     corners = path.guide.corners(path.corners[0], legs)
     return TimedLegs(path.guide, legs, corners, inputs, fast, rises, falls, np.append(0.0, stops))
 
@@ -157,8 +160,10 @@ class _Rooms:
         times = np.linspace(0.0, self.count * STEP, count + 1)  # ends and middles of the parts
         first = len(scene.queries.shapes.geometryObjects) - len(scene.obstacles)
         self._shape = self._shapes.shapes.pairs[:, 1] - first
-        self._places = np.array([[as_row(one.at(float(t))) for one in scene.obstacles] for t in times])
-        far = np.array([shifts([one], times) for one in scene.obstacles]).T
+        self._places = np.array(
+            [[as_row(obstacle.at(float(t))) for obstacle in scene.obstacles] for t in times]
+        )
+        far = np.array([shifts([obstacle], times) for obstacle in scene.obstacles]).T
         self._gone = np.vstack([np.zeros(len(scene.obstacles)), np.cumsum(far, axis=0)])
         self._movers = np.arange(first, first + len(scene.obstacles))
 
@@ -169,25 +174,25 @@ class _Rooms:
         return self._shapes.levers @ sizes
 
     def taken(self, q: Array, leg: Array) -> Array:
-        """Of all intervals, whether the robot may not be at q (n,), give or take a leg."""
-        found = np.zeros(self.count, dtype=bool)
-        self._look(q, self._kept + self.way(leg), 0, PARTS * self.count, found)
-        return found
+        """For each interval, whether the robot at q (n,), give or take a leg, comes too near."""
+        occupied = np.zeros(self.count, dtype=bool)
+        self._look(q, self._kept + self.way(leg), 0, PARTS * self.count, occupied)
+        return occupied
 
-    def _look(self, q: Array, kept: Array, begin: int, end: int, found: Array) -> None:
+    def _look(self, q: Array, distances: Array, begin: int, end: int, occupied: Array) -> None:
         middle = begin + end  # in halves of the parts
         gone = self._gone
         far = np.maximum(gone[2 * end] - gone[middle], gone[middle] - gone[2 * begin])
         self._shapes.place[self._movers] = self._places[middle]
-        self._shapes.kept[:] = kept + far[self._shape]
+        self._shapes.kept[:] = distances + far[self._shape]
         if self._check.too_near(q) < 0:
             return
         if end - begin == 1:
-            found[begin // PARTS] = True
+            occupied[begin // PARTS] = True
             return
         half = (begin + end) // 2
-        self._look(q, kept, begin, half, found)
-        self._look(q, kept, half, end, found)
+        self._look(q, distances, begin, half, occupied)
+        self._look(q, distances, half, end, occupied)
 
     def free(self, taken: Array, passes: Array) -> Array:
         """Whether a drive over cells (C, K), at their borders after `passes` (C + 1,), s, may begin at the

@@ -164,8 +164,8 @@ def reeds_shepp(x: float, y: float, phi: float, word: Array) -> float:
 @compiled
 def turned(angle: float) -> float:
     """The angle in [0, 2 π)."""
-    found = angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi))
-    return 0.0 if 2.0 * math.pi - found < NONE else found
+    remainder = angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi))
+    return 0.0 if 2.0 * math.pi - remainder < NONE else remainder
 
 
 @compiled

@@ -251,12 +251,12 @@ def look(scene: MovedShapes, q: Array, leg: Array, share: float, joints: Array, 
 @compiled
 def leg_blocked(scene: MovedShapes, q: Array, leg: Array) -> int:
     """The pair that comes too near on a leg from q, which is free itself; -1 where none does."""
-    here, joints = scratch(q.shape[0]), scratch((scene.joints.parent.shape[0], 12))
+    current, joints = scratch(q.shape[0]), scratch((scene.joints.parent.shape[0], 12))
     begin_motion(scene, leg)
     share = 0.0
     while 0.0 <= share < 1.0:
-        along(scene.planar[()], q, leg, share, scene.mimic_joints, here)
-        share = look(scene, here, leg, share, joints, 1)
+        along(scene.planar[()], q, leg, share, scene.mimic_joints, current)
+        share = look(scene, current, leg, share, joints, 1)
     return -1 if share >= 0.0 else int(-1.0 - share)
 
 
@@ -265,20 +265,20 @@ def first_blocked(integers: Integers, floats: Array, q: Array, legs: Array, coun
     """The first pair that is too near on the first `count` of legs (L, 3 + n) from q, or -1; end (n,): where
     they lead."""
     scene = views(MovedShapes, integers, floats, 0)
-    there = scratch(q.shape[0])
+    current = scratch(q.shape[0])
     copied(q, end)
     for i in range(count):  # most motions that are blocked are so at the middle or the end of a leg, too
         for share in (0.5, 1.0):
-            along(scene.planar[()], end, legs[i], share, scene.mimic_joints, there)
-            pair = too_near(scene, there)
+            along(scene.planar[()], end, legs[i], share, scene.mimic_joints, current)
+            pair = too_near(scene, current)
             if pair >= 0:
                 return pair
-        copied(there, end)
+        copied(current, end)
     copied(q, end)
     for i in range(count):
         pair = leg_blocked(scene, end, legs[i])
         if pair >= 0:
             return pair
-        along(scene.planar[()], end, legs[i], 1.0, scene.mimic_joints, there)
-        copied(there, end)
+        along(scene.planar[()], end, legs[i], 1.0, scene.mimic_joints, current)
+        copied(current, end)
     return -1
