@@ -34,15 +34,15 @@ ENDLESS = 1e3
 def query_shapes(robot: Robot, meshes: str = HULLS) -> pin.GeometryModel:
     """The robot's collision shapes, all convex, without pairs: primitives as they are, meshes as "hulls" or
     as "capsules" around their points."""
-    found = pin.GeometryModel()
+    shapes = pin.GeometryModel()
     for shape in robot.collision_model.geometryObjects:
         copied, placement = pin.GeometryObject(shape), shape.placement
         if isinstance(shape.geometry, coal.BVHModelBase):
             points = np.array(shape.geometry.vertices()).reshape(-1, 3)
             copied.geometry, own = _capsule(points) if meshes == CAPSULES else (_hull(points), None)
             copied.placement = placement if own is None else placement * own
-        found.addGeometryObject(copied)
-    return found
+        shapes.addGeometryObject(copied)
+    return shapes
 
 
 def pairs_of(shapes: pin.GeometryModel) -> list[Pair]:
@@ -121,34 +121,41 @@ def measured_pairs(
     robot: Robot, shapes: pin.GeometryModel, pairs: Sequence[Pair]
 ) -> Callable[[Array], Array]:
     """The function q (n,) -> each pair's distance (pairs,), m; below 0 inside each other."""
-    model, data, found = robot.model, robot.model.createData(), pin.GeometryData(shapes)
+    model, data, geometry_data = robot.model, robot.model.createData(), pin.GeometryData(shapes)
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     objects = shapes.geometryObjects
 
     def measure(q: Array) -> Array:
-        pin.updateGeometryPlacements(model, data, shapes, found, q)
+        pin.updateGeometryPlacements(model, data, shapes, geometry_data, q)
         distances = np.zeros(len(pairs))
         for k, (i, j) in enumerate(pairs):
             result.clear()
-            one, two = (coal.Transform3s(found.oMg[x].rotation, found.oMg[x].translation) for x in (i, j))
-            distances[k] = coal.distance(objects[i].geometry, one, objects[j].geometry, two, request, result)
+            first, second = (
+                coal.Transform3s(geometry_data.oMg[x].rotation, geometry_data.oMg[x].translation)
+                for x in (i, j)
+            )
+            distances[k] = coal.distance(
+                objects[i].geometry, first, objects[j].geometry, second, request, result
+            )
         return distances
 
     return measure
 
 
-def named_pairs(given: Sequence[tuple[str, str]], names: Sequence[Sequence[str]], what: str) -> set[Pair]:
+def named_pairs(requested: Sequence[tuple[str, str]], names: Sequence[Sequence[str]], what: str) -> set[Pair]:
     """The pairs that names mean, by the `names` of each shape, with * for any letters and ? for one;
     `InputError` for unknown names, patterns that nothing matches, or not two."""
     known = list(dict.fromkeys(name for of_one in names for name in of_one))
-    found: set[Pair] = set()
-    for pair in given:
+    pairs: set[Pair] = set()
+    for pair in requested:
         if isinstance(pair, str) or not isinstance(pair, Sequence) or len(pair) != 2:
             raise InputError(where=what, expected="two names", got=pair)
         meant = [_meant(name, known, what) for name in pair]
-        first, second = ([i for i, of_one in enumerate(names) if not one.isdisjoint(of_one)] for one in meant)
-        found |= {(min(i, j), max(i, j)) for i in first for j in second}
-    return found
+        first, second = (
+            [i for i, of_one in enumerate(names) if not group.isdisjoint(of_one)] for group in meant
+        )
+        pairs |= {(min(i, j), max(i, j)) for i in first for j in second}
+    return pairs
 
 
 def _meant(name: str, known: Sequence[str], what: str) -> set[str]:
@@ -199,14 +206,14 @@ def touching_links(robot: Robot, count: int = CONFIGURATIONS) -> Touching:
         return Touching(len(links), count, {})
     for pair in pairs:
         shapes.addCollisionPair(pin.CollisionPair(*pair))
-    found, data = pin.GeometryData(shapes), robot.model.createData()
+    geometry_data, data = pin.GeometryData(shapes), robot.model.createData()
     named = [(links[i], links[j]) for i, j in pairs]
     distinct = list(dict.fromkeys(named))
     column = np.array([distinct.index(pair) for pair in named])
     touched = np.zeros(len(distinct))
     for q in random_configurations(robot, count):
-        pin.computeCollisions(robot.model, data, shapes, found, q, False)
-        hit = [result.isCollision() for result in found.collisionResults]
+        pin.computeCollisions(robot.model, data, shapes, geometry_data, q, False)
+        hit = [result.isCollision() for result in geometry_data.collisionResults]
         touched[np.unique(column[hit])] += 1.0
     order = np.argsort(-touched, kind="stable")
     return Touching(len(links), count, {distinct[k]: float(touched[k]) / count for k in order})

@@ -53,7 +53,7 @@ class Scene:
 
     def places(self, t: float) -> tuple[Any, ...]:
         """Pinocchio's placements of the obstacles at t, s; None for one with a path, which a record knows."""
-        return tuple(None if one.moves else one.at(t) for one in self.obstacles)
+        return tuple(None if obstacle.moves else obstacle.at(t) for obstacle in self.obstacles)
 
     def check_start(self, t: float, q: Array) -> list[str]:
         """What is nearer than the distance at q (n,), a sentence each pair, the nearest first.
@@ -62,16 +62,16 @@ class Scene:
         ------
         InputError : an obstacle contains a shape of the robot: no distance shows the way out
         """
-        found = self.queries.distances(t, q, range(len(self.names)))
-        for k in np.flatnonzero(found < 0.0):
+        distances = self.queries.distances(t, q, range(len(self.names)))
+        for k in np.flatnonzero(distances < 0.0):
             if self.queries.inside(int(k)):
                 link, obstacle = self.names[k]
-                what = f"contains {link} at the start ({-found[k]:.3g} m deep)"
+                what = f"contains {link} at the start ({-distances[k]:.3g} m deep)"
                 raise InputError(what, where=f"obstacle {obstacle}")
-        order = np.argsort(found)
+        order = np.argsort(distances)
         return [
-            f"{self.words(int(k))} are {found[k]:.4g} m apart at the start"
-            for k in order[: np.count_nonzero(found < self.distance)]
+            f"{self.words(int(k))} are {distances[k]:.4g} m apart at the start"
+            for k in order[: np.count_nonzero(distances < self.distance)]
         ]
 
 
@@ -97,13 +97,15 @@ def set_up(
     known: list[tuple[str, ...]] = [
         (shape.name, link) for shape, link in zip(shapes.geometryObjects, links, strict=True)
     ]
-    clash = sorted({one.name for one in obstacles} & {name for names in known for name in names})
+    clash = sorted({obstacle.name for obstacle in obstacles} & {name for names in known for name in names})
     if clash:
         raise InputError(f"{clash[0]} is a link or shape of the robot", where="collisions: obstacles")
-    sorted_obstacles = tuple(sorted(obstacles, key=lambda one: isinstance(one.shape, HalfSpace)))
-    for one in sorted_obstacles:
-        shapes.addGeometryObject(pin.GeometryObject(one.name, 0, 0, one.at(0.0), one.shape.geometry()))
-        known.append((one.name,))
+    sorted_obstacles = tuple(sorted(obstacles, key=lambda obstacle: isinstance(obstacle.shape, HalfSpace)))
+    for obstacle in sorted_obstacles:
+        shapes.addGeometryObject(
+            pin.GeometryObject(obstacle.name, 0, 0, obstacle.at(0.0), obstacle.shape.geometry())
+        )
+        known.append((obstacle.name,))
     wanted = pairs_of(robot.collision_model) if own else []
     wanted += [(i, j) for j in range(count, count + len(sorted_obstacles)) for i in range(count)]
     notes: list[str] = []
@@ -116,14 +118,14 @@ def set_up(
         raise InputError(f"none is beside the file of {robot.name}", where="srdf", expected="a path")
     if srdf:
         all_disabled = robot.semantics.disabled if srdf is True else disabled_pairs(read_srdf(srdf), robot)
-        disabled = [pair for pair in all_disabled if all(any(one in n for n in known) for one in pair)]
-        found = named_pairs(disabled, known, "srdf") & {*wanted}
-        touch = touching(robot, shapes, sorted(found), 0.0)
+        disabled = [pair for pair in all_disabled if all(any(link in n for n in known) for link in pair)]
+        matches = named_pairs(disabled, known, "srdf") & {*wanted}
+        touch = touching(robot, shapes, sorted(matches), 0.0)
         often = [f"{name(pair)} ({share:.1%})" for pair, share in touch.items() if 0.0 < share < 1.0]
-        notes.append(f"left out by the SRDF: {len(found)} pairs of shapes")
+        notes.append(f"left out by the SRDF: {len(matches)} pairs of shapes")
         disables = "the SRDF disables pairs that do touch, in a share of random configurations"
         notes += [f"{disables}: {few(often)}"] if often else []
-        left_out |= found
+        left_out |= matches
     wanted = [pair for pair in wanted if pair not in left_out]
     always = [pair for pair in wanted if pair in own_near]
     always += always_near(robot, shapes, [pair for pair in wanted if pair[1] >= count], distance)
@@ -133,18 +135,18 @@ def set_up(
             f"left out, as nearer than {distance:g} m in every configuration tried: {len(always)} "
             f"pairs of shapes: {few(near)}"
         )
-    for j, one in enumerate(sorted_obstacles, count):
+    for j, obstacle in enumerate(sorted_obstacles, count):
         pairs = [pair for pair in wanted if pair[1] == j]
         touches = bool(pairs) and {*pairs} <= {*always}
         if touches and len(always_near(robot, shapes, pairs, -DEEP)) == len(pairs):
             what = f"contains {robot.name} in every configuration tried"
-            raise InputError(what, where=f"obstacle {one.name}")
-    kept = [pair for pair in wanted if pair not in {*always}]
-    if not kept:
+            raise InputError(what, where=f"obstacle {obstacle.name}")
+    remaining = [pair for pair in wanted if pair not in {*always}]
+    if not remaining:
         raise InputError(f"nothing to keep {robot.name} from: no obstacle, no own shape", where="collisions")
     shapes.removeAllCollisionPairs()
-    for pair in kept:
+    for pair in remaining:
         shapes.addCollisionPair(pin.CollisionPair(*pair))
     queries = Queries(robot, shapes, sorted_obstacles, band, distance + FACES)
-    names = tuple((known[i][-1], known[j][-1]) for i, j in kept)
+    names = tuple((known[i][-1], known[j][-1]) for i, j in remaining)
     return Scene(robot, sorted_obstacles, queries, names, distance, tuple(notes))
