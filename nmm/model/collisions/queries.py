@@ -56,21 +56,21 @@ class Queries:
         self.robot, self.shapes = robot, shapes
         self._own = len(shapes.geometryObjects) - len(obstacles)
         self._model, self._data = robot.model, robot.model.createData()
-        self.found = found = pin.GeometryData(shapes)
+        self.found = geometry_data = pin.GeometryData(shapes)
         for shape in shapes.geometryObjects:
             shape.geometry.computeLocalAABB()
         # By default Coal starts from the previous result, and normals then depend on the history by 3e-3. A
         # start from the shapes' bounding volumes takes 0.92 times as long and halves the error.
-        for request in found.distanceRequests:
+        for request in geometry_data.distanceRequests:
             request.gjk_tolerance, request.epa_tolerance = GJK_TOLERANCE, EPA_TOLERANCE
             request.gjk_initial_guess = coal.GJKInitialGuess.BoundingVolumeGuess
             with warnings.catch_warnings():  # deprecated, but still read
                 warnings.simplefilter("ignore", DeprecationWarning)
                 request.enable_cached_gjk_guess = False
-        self.results = _result_view(robot.model, shapes, found)
-        self.places = placement_rows(found.oMg)
+        self.results = _result_view(robot.model, shapes, geometry_data)
+        self.places = placement_rows(geometry_data.oMg)
         for k in range(len(shapes.collisionPairs)):
-            found.deactivateCollisionPair(k)
+            geometry_data.deactivateCollisionPair(k)
         memory = Memory()
         memory.add(_scene(robot, shapes, obstacles, band, faces))
         self.blocks: Blocks = memory.blocks()
@@ -78,7 +78,7 @@ class Queries:
         pin.computeJointJacobians(self._model, self._data, pin.neutral(self._model))
         self.J = np.asarray(self._data.J).reshape(6, robot.n, order="F").T
         self.least = np.inf
-        self.moving = [(i, one) for i, one in enumerate(obstacles, self._own)]
+        self.moving = [(i, obstacle) for i, obstacle in enumerate(obstacles, self._own)]
         self._seen: dict[int, Any] = {}
         self._find = checked_by_caller(find_near, _FIND)
         self._row = checked_by_caller(_row, _ROW)
@@ -98,7 +98,7 @@ class Queries:
     def among(self, obstacles: Sequence[Obstacle]) -> Iterator[None]:
         """In the block, the obstacles are where these (one each, in order) are, as in a record."""
         own = self.moving
-        self.moving = [(i, one) for (i, _), one in zip(own, obstacles, strict=True)]
+        self.moving = [(i, obstacle) for (i, _), obstacle in zip(own, obstacles, strict=True)]
         try:
             yield
         finally:
@@ -111,12 +111,12 @@ class Queries:
 
     def _choose(self) -> None:
         """Find which pairs are near where the shapes are, for Pinocchio too."""
-        changed, active, found = self.scene.changed, self.scene.active, self.found
+        changed, active, geometry_data = self.scene.changed, self.scene.active, self.found
         for k in changed[: self._find(*self.blocks, self.places)].tolist():
             if active[k]:
-                found.activateCollisionPair(k)
+                geometry_data.activateCollisionPair(k)
             else:
-                found.deactivateCollisionPair(k)
+                geometry_data.deactivateCollisionPair(k)
 
     def update(self, t: float, q: Array, integers: Integers, floats: Array, place: int) -> None:
         """Measure, and write the rows of near pairs where a record `Rows` lies in the blocks."""
@@ -125,17 +125,17 @@ class Queries:
         self.least = self._rows(self.blocks, self.results, self.places, self.J, *self._where)
 
     def carry(
-        self, pair: int, here: tuple[float, Array], there: tuple[float, Array], rows: Rows, slot: int
+        self, pair: int, now: tuple[float, Array], later: tuple[float, Array], rows: Rows, slot: int
     ) -> None:
-        """Write a row of the last `update` for a pair's points nearest `there`, (t, q), placed as `here`."""
-        self.distances(*there, [pair])
-        found, ends = self.results[pair, 1:].copy(), self.scene.pairs[pair].tolist()
-        points = found[3:].reshape(2, 3)
+        """Write a row of the last `update`: a pair's points nearest at `later`, (t, q), placed as at `now`."""
+        self.distances(*later, [pair])
+        result, ends = self.results[pair, 1:].copy(), self.scene.pairs[pair].tolist()
+        points = result[3:].reshape(2, 3)
         local = [self.found.oMg[i].actInv(point) for i, point in zip(ends, points, strict=True)]
-        self.place(*here)
+        self.place(*now)
         for k, (i, point) in enumerate(zip(ends, local, strict=True)):
             rows.points[slot, 3 * k : 3 * k + 3] = self.found.oMg[i].act(point)
-        rows.points[slot, 6:] = found[:3]
+        rows.points[slot, 6:] = result[:3]
         rows.pair[slot] = pair
         self._row(self.blocks, self.places, self.J, *self._where, slot)
 
@@ -148,13 +148,15 @@ class Queries:
 
     def inside(self, pair: int) -> bool:
         """Whether the middle of a pair's first shape is inside its second one, an obstacle."""
-        i, j = (int(one) for one in self.scene.pairs[pair])
+        i, j = (int(index) for index in self.scene.pairs[pair])
         if j < self._own:
             return False
-        here = coal.Transform3s(np.eye(3), self.found.oMg[i].act(self.scene.boxes[i, :3]))
-        there = coal.Transform3s(self.found.oMg[j].rotation, self.found.oMg[j].translation)
+        point_pose = coal.Transform3s(np.eye(3), self.found.oMg[i].act(self.scene.boxes[i, :3]))
+        shape_pose = coal.Transform3s(self.found.oMg[j].rotation, self.found.oMg[j].translation)
         point, geometry = coal.Sphere(1e-6), self.shapes.geometryObjects[j].geometry
-        d = coal.distance(point, here, geometry, there, coal.DistanceRequest(), coal.DistanceResult())
+        d = coal.distance(
+            point, point_pose, geometry, shape_pose, coal.DistanceRequest(), coal.DistanceResult()
+        )
         return bool(d < 0.0)
 
     def nearest(self, t: float, q: Array) -> tuple[float, int]:
@@ -173,20 +175,25 @@ class Queries:
         return least, nearest
 
 
-def _result_view(model: pin.Model, shapes: pin.GeometryModel, found: pin.GeometryData) -> Array:
+def _result_view(model: pin.Model, shapes: pin.GeometryModel, geometry_data: pin.GeometryData) -> Array:
     """(P, 10) = [d, n, p1, p2] of every pair's last query, m, world axes: a view of Coal's own memory, where
     they must be contiguous; else `NmmError`."""
-    results = found.distanceResults
+    results = geometry_data.distanceResults
     if not len(results):
         return np.zeros((0, 10))
-    pin.computeDistances(model, model.createData(), shapes, found, pin.neutral(model))
+    pin.computeDistances(model, model.createData(), shapes, geometry_data, pin.neutral(model))
     start, end = (int(results[k].normal.ctypes.data) - 8 for k in (0, len(results) - 1))
     stride = (end - start) // (len(results) - 1) if len(results) > 1 else 80
     numbers = np.ctypeslib.as_array((ctypes.c_double * ((end + 80 - start) // 8)).from_address(start))
     rows = np.lib.stride_tricks.as_strided(numbers, (len(results), 10), (stride, 8))
-    for row, one in zip(rows, results, strict=True):
-        said = [one.min_distance, *one.normal, *one.getNearestPoint1(), *one.getNearestPoint2()]
-        if not np.array_equal(row, said, equal_nan=True):
+    for row, result in zip(rows, results, strict=True):
+        reported = [
+            result.min_distance,
+            *result.normal,
+            *result.getNearestPoint1(),
+            *result.getNearestPoint2(),
+        ]
+        if not np.array_equal(row, reported, equal_nan=True):
             raise NmmError("this version of Coal keeps distances in another way than nmm expects")
     return rows
 

@@ -47,7 +47,7 @@ class SweptCheck:
         self, queries: Queries, changes: Array, distance: float, target: float, horizon: float = 0.0
     ) -> None:
         self._queries, self._distance, self._target = queries, distance, target
-        self._paths = [one for _, one in queries.moving if one.moves]
+        self._paths = [obstacle for _, obstacle in queries.moving if obstacle.moves]
         count = max(2, round(horizon / EVERY)) if self._paths and horizon else 0
         self._first: int | None = None
         memory = Memory()
@@ -120,8 +120,8 @@ class SweptCheck:
         `driven` (m,) for `lasts` s and brakes; infinite if none does."""
         way = self._way
         way.driven[:], way.lasts[()] = driven, lasts
-        found = (short.after for _, short in self._shorts(t, q, u, dt, roughly=True) if short is not None)
-        first = next(found, np.inf)
+        times = (short.after for _, short in self._shorts(t, q, u, dt, roughly=True) if short is not None)
+        first = next(times, np.inf)
         way.lasts[()] = 0.0
         return first
 
@@ -140,14 +140,14 @@ class SweptCheck:
         else:
             self._follow_paths(t, looks)
         look, first = 0, 0
-        while (found := self._unsure(*self._both, self._listed, look, first)) >= 0:
-            look, first = divmod(found, len(scene.kept))
+        while (index := self._unsure(*self._both, self._listed, look, first)) >= 0:
+            look, first = divmod(index, len(scene.kept))
             pair, after = int(scene.risky[first]), float(ahead.after[look])
             (d,) = queries.distances(t + after, ahead.q[look], [pair])
             self._renew(*self._both, queries.results, queries.places, pair)
             by = float(scene.kept[pair] - d)
-            there = float(ahead.weight[look]), ahead.q[look].copy()
-            yield look, Short(pair, after, *there, by) if by > 0.0 else None
+            at_contact = float(ahead.weight[look]), ahead.q[look].copy()
+            yield look, Short(pair, after, *at_contact, by) if by > 0.0 else None
             first += 1
 
     def _follow_paths(self, t: float, looks: int) -> None:
@@ -179,7 +179,7 @@ def _way(queries: Queries, changes: Array, standing: int) -> SweptMotion:
     planes = np.full((len(scene.pairs), 2, 4), np.inf)
     below = scene.pairs[:, 1] >= scene.planes
     planes[below, 1] = scene.boxes[scene.pairs[below, 1], :4]
-    discs = [one.geometry.radius if isinstance(one.geometry, coal.Cylinder) else 0.0 for one in objects]
+    discs = [shape.geometry.radius if isinstance(shape.geometry, coal.Cylinder) else 0.0 for shape in objects]
     return SweptMotion(
         joints=robot.joints,
         inputs=inputs_of(robot),
