@@ -38,7 +38,7 @@ def alternatives(wanted: Any) -> list[Any]:
     """The goals of which one is to be reached."""
     if not isinstance(wanted, Sequence) or isinstance(wanted, str) or not len(wanted):
         return [wanted]
-    each = all(isinstance(one, Task | Mapping | Sequence | np.ndarray) for one in wanted)
+    each = all(isinstance(goal, Task | Mapping | Sequence | np.ndarray) for goal in wanted)
     return list(wanted) if each else [wanted]
 
 
@@ -58,7 +58,7 @@ class GoalPostures:
 
     def find(self, wanted: object, start: Array, rng: np.random.Generator, count: int = MANY) -> list[Array]:
         """Up to `count` configurations (n,) that reach a goal, those nearest to the start's joints first."""
-        found: list[Array] = []
+        configurations: list[Array] = []
         tries = iter(self._reaching(wanted, start, rng))
         for q in tries:
             self.tried += 1
@@ -67,12 +67,14 @@ class GoalPostures:
             pair = self.check.too_near(q)
             if pair >= 0 and self.check.scene is not None:
                 self.in_the_way[self.check.scene.words(pair)] += 1
-            elif not any(np.abs(self.robot.short_way(q - other)).max() < 1e-3 for other in found):
-                found.append(q)
-            if len(found) == count:
+            elif not any(np.abs(self.robot.short_way(q - other)).max() < 1e-3 for other in configurations):
+                configurations.append(q)
+            if len(configurations) == count:
                 break
         first = min(3, self.robot.platform.n_p)
-        return sorted(found, key=lambda q: float(np.abs(self.robot.short_way(q - start)[first:]).sum()))
+        return sorted(
+            configurations, key=lambda q: float(np.abs(self.robot.short_way(q - start)[first:]).sum())
+        )
 
     def _reaching(self, wanted: object, start: Array, rng: np.random.Generator) -> Iterator[Array | None]:
         robot = self.robot

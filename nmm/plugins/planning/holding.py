@@ -78,11 +78,11 @@ def follow(
     ways = views(Trees, integers, floats, PLACE).ways
     n, planar = q.shape[0], scene.planar[()]
     platform = ways.steering[()] + 1 if ways.steering[()] >= 0 else 3 * planar
-    corner, here, there, chord = scratch(n), scratch(n), scratch(n), scratch(3 + n)
+    corner, current, trial, chord = scratch(n), scratch(n), scratch(n), scratch(3 + n)
     if legs.shape[0] == 0:
         ended[0] = ARRIVED if close(q, STEPS, own_integers, own_floats) == 1 else LOST
     copied(q, corner)
-    copied(q, here)
+    copied(q, current)
     count = 0
     for k in range(legs.shape[0]):
         share, usual = 0.0, 1.0 / max(2.0, math.ceil(leg_time(ways, legs[k]) / tick))
@@ -91,14 +91,14 @@ def follow(
             step = min(step, 1.0 - share)
             if 1.0 - share - step < 1e-9:
                 step = 1.0 - share
-            along(planar, corner, legs[k], share + step, scene.mimic_joints, there)
+            along(planar, corner, legs[k], share + step, scene.mimic_joints, trial)
             for i in range(platform, n):
-                there[i] = here[i]
-            kept = close(there, CLOSE, own_integers, own_floats)
+                trial[i] = current[i]
+            holds = close(trial, CLOSE, own_integers, own_floats)
             longest = 0.0
             for i in range(platform, n):
-                longest = max(longest, abs(there[i] - here[i]))
-            if kept == 0 or longest > far:
+                longest = max(longest, abs(trial[i] - current[i]))
+            if holds == 0 or longest > far:
                 step *= 0.5
                 if step < LEAST * usual:
                     ended[0] = LOST
@@ -107,20 +107,20 @@ def follow(
             for i in range(3 + n):
                 chord[i] = step * legs[k, i]
             for i in range(platform, n):
-                chord[3 + i] = there[i] - here[i]
+                chord[3 + i] = trial[i] - current[i]
             if count == nodes.shape[0]:
                 ended[0] = FULL
                 return count
-            if too_near(scene, there) >= 0 or leg_blocked(scene, here, chord) >= 0:
+            if too_near(scene, trial) >= 0 or leg_blocked(scene, current, chord) >= 0:
                 ended[0] = BLOCKED
                 return count
             share = 1.0 if step == 1.0 - share else share + step
-            copied(there, nodes[count])
-            copied(there, here)
+            copied(trial, nodes[count])
+            copied(trial, current)
             places[count, 0], places[count, 1] = k, share
             count += 1
             step = min(usual, 2.0 * step)
-        copied(here, corner)
+        copied(current, corner)
         ended[0] = ARRIVED
     return count
 
@@ -172,11 +172,11 @@ class Held(TaskError):
         self._ended = np.zeros(1, dtype=np.int64)
 
     def _expect_target(self, hold: Task, q: Array, tolerance: Goal) -> None:
-        given = TaskError(self.robot, hold, tolerance)
-        targets = [given.evaluate(q, t)[1] for t in (0.0, 1.0, math.e)]
+        task_error = TaskError(self.robot, hold, tolerance)
+        targets = [task_error.evaluate(q, t)[1] for t in (0.0, 1.0, math.e)]
         if not all(np.array_equal(target, targets[0]) for target in targets):
             raise InputError("its target moves", where="plan: hold", expected="a task whose target stands")
-        metres, radians = norms(given.evaluate(q)[2], unit_codes(given.rows))
+        metres, radians = norms(task_error.evaluate(q)[2], unit_codes(task_error.rows))
         if metres > tolerance.m or radians > tolerance.rad:
             got = f"{metres:.3g} m and {radians:.3g} rad from it"
             raise InputError(where="plan: hold", expected="a target where the start has it", got=got)
@@ -186,8 +186,8 @@ class Held(TaskError):
         low, high = np.where(self.robot.limited, self.robot.q_limits, [-np.pi, np.pi]).T
         for k in range(5):
             J = self._jacobian(q if k == 0 else self.robot.following.placed(rng.uniform(low, high)))
-            found = [np.linalg.matrix_rank(one, tol=1e-6) for one in (J, J[:, self.arm])]
-            ranks = np.maximum(ranks, found)
+            both = [np.linalg.matrix_rank(matrix, tol=1e-6) for matrix in (J, J[:, self.arm])]
+            ranks = np.maximum(ranks, both)
         if ranks[1] < ranks[0] or not ranks[1]:
             what = f"the arm alone moves it in {ranks[1]} of the {ranks[0]} ways in which the robot does"
             expected = "what the arm can keep, as Task(Position('tool'), target)"
@@ -207,8 +207,8 @@ class Held(TaskError):
     def along(self, q: Array, legs: Array, tick: float, far: float) -> Followed:
         """How far the arm follows along legs (L, 3 + n) from q (n,), by steps of so many s, and of joints by
         so many rad or m, at most."""
-        given = *self.check.blocks, *self._program.blocks, q, np.ascontiguousarray(legs), tick, far
-        count = self._follow(*given, self._nodes, self._places, self._ended)
+        arguments = *self.check.blocks, *self._program.blocks, q, np.ascontiguousarray(legs), tick, far
+        count = self._follow(*arguments, self._nodes, self._places, self._ended)
         return Followed(self._nodes[:count].copy(), self._places[:count].copy(), int(self._ended[0]))
 
     def off(self, q: Array) -> tuple[float, float]:
@@ -217,7 +217,7 @@ class Held(TaskError):
 
     def tangent(self, q: Array, rates: Array) -> Array:
         """Rates (n,) at q (n,) of which the platform's (n_p,) are given, with the arm's least."""
-        J, found = self._jacobian(q), np.zeros_like(q)
-        found[: self.platform] = rates
-        found[self.arm] = -np.linalg.pinv(J[:, self.arm], rcond=1e-8) @ (J[:, : self.platform] @ rates)
-        return self._leads @ found
+        J, tangent = self._jacobian(q), np.zeros_like(q)
+        tangent[: self.platform] = rates
+        tangent[self.arm] = -np.linalg.pinv(J[:, self.arm], rcond=1e-8) @ (J[:, : self.platform] @ rates)
+        return self._leads @ tangent

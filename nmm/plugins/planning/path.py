@@ -67,25 +67,25 @@ class Guide:
 
     def corners(self, q: Array, legs: Array) -> Array:
         """Where the legs lead one after the other from q (n,): (L + 1, n)."""
-        found = [q]
+        corners = [q]
         for leg in legs:
-            found.append(self.at(found[-1], leg, 1.0))
-        return np.array(found)
+            corners.append(self.at(corners[-1], leg, 1.0))
+        return np.array(corners)
 
     def merged(self, legs: Array) -> Array:
         """The same motion with legs that go the same way as one."""
-        found: list[Array] = []
+        merged: list[Array] = []
         for leg in legs:
             size = float(np.linalg.norm(leg))
             if size == 0.0:
                 continue
-            if found:
-                before = float(np.linalg.norm(found[-1]))
-                if np.abs(found[-1] / before - leg / size).max() < SAME:
-                    found[-1] = found[-1] + leg
+            if merged:
+                before = float(np.linalg.norm(merged[-1]))
+                if np.abs(merged[-1] / before - leg / size).max() < SAME:
+                    merged[-1] = merged[-1] + leg
                     continue
-            found.append(leg)
-        return np.array(found).reshape(-1, legs.shape[1])
+            merged.append(leg)
+        return np.array(merged).reshape(-1, legs.shape[1])
 
 
 def shortened(
@@ -109,13 +109,19 @@ def shortened(
             until = np.cumsum(times)
         early, late = np.sort(rng.uniform(0.0, until[-1], 2))
         i, j = (int(k) for k in np.minimum(np.searchsorted(until, [early, late]), len(legs) - 1))
-        one, two = ((t - until[k] + times[k]) / times[k] for t, k in ((early, i), (late, j)))
-        a, b = guide.at(corners[i], legs[i], one), guide.at(corners[j], legs[j], two)
+        share_a, share_b = ((t - until[k] + times[k]) / times[k] for t, k in ((early, i), (late, j)))
+        a, b = guide.at(corners[i], legs[i], share_a), guide.at(corners[j], legs[j], share_b)
         if i == j:
             continue
-        between = np.vstack([(1.0 - one) * legs[i], legs[i + 1 : j], two * legs[j]])
+        between = np.vstack([(1.0 - share_a) * legs[i], legs[i + 1 : j], share_b * legs[j]])
         for new in (guide.way(a, b), _with_straight_arm(guide, between, first)):
-            parts = [legs[:i], one * legs[i : i + 1], new, (1.0 - two) * legs[j : j + 1], legs[j + 1 :]]
+            parts = [
+                legs[:i],
+                share_a * legs[i : i + 1],
+                new,
+                (1.0 - share_b) * legs[j : j + 1],
+                legs[j + 1 :],
+            ]
             shorter = guide.merged(np.vstack(parts))  # with the stops where legs were cut
             if until[-1] - float(guide.times(shorter).sum()) > WORTH and blocked(a, new, shorter) < 0:
                 legs, known = shorter, False
@@ -124,11 +130,11 @@ def shortened(
 
 
 def _with_straight_arm(guide: Guide, legs: Array, first: int) -> Array:
-    found = legs.copy()
-    found[:, first:] = 0.0
-    times = np.abs(found).max(axis=1)
+    straight = legs.copy()
+    straight[:, first:] = 0.0
+    times = np.abs(straight).max(axis=1)
     if times.sum() > 0.0:
-        found[:, first:] = (times / times.sum())[:, np.newaxis] * legs[:, first:].sum(axis=0)
+        straight[:, first:] = (times / times.sum())[:, np.newaxis] * legs[:, first:].sum(axis=0)
     else:
-        found = legs.sum(axis=0, keepdims=True)
-    return found
+        straight = legs.sum(axis=0, keepdims=True)
+    return straight

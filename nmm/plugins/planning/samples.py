@@ -138,7 +138,7 @@ def write_fastest(
     rate. Joints' rates are largest at an end. The platform's twist is looked at `LOOKS` times, and the
     largest change between two looks is added: linear in time on most platforms, it is nowhere larger."""
     n, m, n_p = q.shape[0], u.shape[0], inputs.coordinates
-    here, none, held, rates = scratch(n), scratch((n, 0)), scratch(m), scratch(n)
+    current, none, held, rates = scratch(n), scratch((n, 0)), scratch(m), scratch(n)
     now, before, change = scratch(3 + n), scratch(3 + n), scratch(3 + n)
     clear(rates)
     clear(leg)
@@ -146,15 +146,15 @@ def write_fastest(
     clear(now)
     for k in range(LOOKS + 1):
         after = time * k / LOOKS
-        flow(inputs, q, u, a, after, substeps, here, none)
+        flow(inputs, q, u, a, after, substeps, current, none)
         for j in range(m):
             held[j] = u[j] + after * a[j]
-        write_rates(inputs, here, held, rates)
+        write_rates(inputs, current, held, rates)
         copied(now, before)
         for i in range(n):
             now[3 + i] = rates[i]
         if n_p >= 3:
-            c, s = math.cos(here[2]), math.sin(here[2])
+            c, s = math.cos(current[2]), math.sin(current[2])
             now[0], now[1], now[2] = c * rates[0] + s * rates[1], c * rates[1] - s * rates[0], rates[2]
             now[3] = now[4] = now[5] = 0.0
         for i in range(3 + n):

@@ -202,7 +202,7 @@ def write_all(scene: MovedShapes, x: Shooting) -> float:
 def sample_blocked(scene: MovedShapes, x: Shooting, k: int) -> int:
     """The pair that comes too near within sample k, or -1."""
     n, q, u, a, time = x.q.shape[1], x.q[k], x.u[k], x.a[k], x.step[()]
-    here, joints, leg = scratch(n), scratch((scene.joints.parent.shape[0], 12)), scratch(3 + n)
+    current, joints, leg = scratch(n), scratch((scene.joints.parent.shape[0], 12)), scratch(3 + n)
     none = scratch((n, 0))
     write_fastest(x.inputs, q, u, a, time, x.substeps[()], leg)
     for pair in range(x.drift.shape[1]):
@@ -210,9 +210,9 @@ def sample_blocked(scene: MovedShapes, x: Shooting, k: int) -> int:
     begin_motion(scene, leg)
     share = 0.0
     while 0.0 <= share < 1.0:
-        flow(x.inputs, q, u, a, share * time, x.substeps[()], here, none)
+        flow(x.inputs, q, u, a, share * time, x.substeps[()], current, none)
         place_movers(scene, x, k, share)
-        share = look(scene, here, leg, share, joints, 0)
+        share = look(scene, current, leg, share, joints, 0)
     return -1 if share >= 0.0 else int(-1.0 - share)
 
 

@@ -81,9 +81,9 @@ class Trains(NamedTuple):
 
 
 @compiled
-def copy_motion(one: Array, other: Array) -> None:
+def copy_motion(source: Array, target: Array) -> None:
     for part in range(DRIVEN):
-        copied(one[part], other[part])
+        copied(source[part], target[part])
 
 
 @compiled
@@ -106,13 +106,13 @@ def pieces(length: float) -> int:
 @compiled
 def drive(scene: MovedShapes, trains: Trains, q: Array, motion: Array, ahead: Array) -> int:
     """ahead (n,): where a motion (DRIVEN, 2) leads from q; 0 where it folds or comes too near."""
-    here = scratch(q.shape[0])
+    current = scratch(q.shape[0])
     copied(q, ahead)
     for part in range(DRIVEN):
         count = pieces(motion[part, 1])
         for _ in range(count):
-            copied(ahead, here)
-            roll_on(trains, here, motion[part, 0], motion[part, 1] / count, ahead)
+            copied(ahead, current)
+            roll_on(trains, current, motion[part, 0], motion[part, 1] / count, ahead)
             for i in range(trains.folds.shape[0]):
                 if not trains.folds[i, 0] <= ahead[3 + i] <= trains.folds[i, 1]:
                     return 0
@@ -198,10 +198,10 @@ def fits(trains: Trains, q: Array, from_tree: int, node: int) -> bool:
 @compiled
 def known(trains: Trains, total: float) -> bool:
     """Whether a way of this length was tried."""
-    found = False
+    tried = False
     for k in range(trains.tried.shape[0]):
-        found = found or abs(total - trains.tried[k]) < 1e-6
-    return found
+        tried = tried or abs(total - trains.tried[k]) < 1e-6
+    return tried
 
 
 @compiled
@@ -216,11 +216,11 @@ def join(scene: MovedShapes, trains: Trains, tree: int, new: int) -> None:
         for i in range(trains.counts[1 - tree]):
             a, b = (new, i) if tree == from_tree else (i, new)
             total = trains.lengths[tree, new] + trains.lengths[1 - tree, i]
-            one, other = trains.nodes[from_tree, a], trains.nodes[1 - from_tree, b]
+            start, end = trains.nodes[from_tree, a], trains.nodes[1 - from_tree, b]
             most = min(trains.shortest[()], totals[JOINED - 1])
-            if total + math.hypot(one[0] - other[0], one[1] - other[1]) >= most:
+            if total + math.hypot(start[0] - end[0], start[1] - end[1]) >= most:
                 continue
-            total += find_word(trains, one, other, 1.0, motion)
+            total += find_word(trains, start, end, 1.0, motion)
             if total < most and not known(trains, total):
                 k = JOINED - 1
                 while k > 0 and totals[k - 1] > total:

@@ -122,19 +122,19 @@ def grow(
     total = 0.0
     for k in range(count):
         total += leg_time(ways, legs[k])
-    arrived, here, there = total <= trees.step[()], scratch(q.shape[0]), scratch(q.shape[0])
+    arrived, current, ahead = total <= trees.step[()], scratch(q.shape[0]), scratch(q.shape[0])
     if not arrived:
         left = trees.step[()] if tree == 0 else total - trees.step[()]
-        copied(node if tree == 0 else q, here)
+        copied(node if tree == 0 else q, current)
         for k in range(count):
             time = leg_time(ways, legs[k])
             share = min(1.0, left / time) if time > 0.0 else 1.0
-            along(planar, here, legs[k], share, mimic_joints, there)
-            copied(there, here)
+            along(planar, current, legs[k], share, mimic_joints, ahead)
+            copied(ahead, current)
             left -= time
             if left <= 0.0:
                 break
-        copied(here, q)
+        copied(current, q)
         if ways.steering[()] >= 0:
             q[ways.steering[()]] = 0.0
         count = way_between(ways, tree, node, q, legs)
@@ -142,7 +142,7 @@ def grow(
     if too_near(scene, q) >= 0:
         return -1
     trees.looked[0] += 1
-    if first_blocked(integers, floats, node if tree == 0 else q, legs, count, there) >= 0:
+    if first_blocked(integers, floats, node if tree == 0 else q, legs, count, ahead) >= 0:
         return -1
     new = trees.counts[tree]
     copied(q, trees.nodes[tree, new])
@@ -169,10 +169,10 @@ def search(integers: Integers, floats: Array, rounds: int, legs: Array) -> int:
         new, target = trees.counts[tree] - 1, scratch(n)
         for _ in range(100):
             copied(trees.nodes[tree, new], target)
-            found = grow(scene, integers, floats, trees, 1 - tree, target, legs)
-            if found != 0:
+            status = grow(scene, integers, floats, trees, 1 - tree, target, legs)
+            if status != 0:
                 break
-        if found == 1:
+        if status == 1:
             trees.met[tree] = new
             trees.met[1 - tree] = trees.counts[1 - tree] - 1
             return 1

@@ -55,10 +55,10 @@ class MotionCheck:
         """Keep the scene's distance, or what these (K, n) have where that is less."""
         if self.scene is None:
             return
-        queries, kept = self.scene.queries, self._shapes.kept
-        pairs = range(len(kept))
+        queries, distances = self.scene.queries, self._shapes.kept
+        pairs = range(len(distances))
         least = np.min([queries.distances(0.0, q, pairs) for q in configurations], axis=0)
-        kept[:] = np.clip(least - 4.0 * MARGIN, 0.0, self.scene.distance)
+        distances[:] = np.clip(least - 4.0 * MARGIN, 0.0, self.scene.distance)
 
     def widen(self, configurations: Array, margin: float) -> None:
         """Keep so much more than the scene's distance, m, or as much as these (K, n) have."""
@@ -102,7 +102,7 @@ def moved_shapes(robot: Robot, scene: Scene | None) -> MovedShapes:
     queries.place(0.0, robot.rest)
     objects, old, turned = queries.shapes.geometryObjects, queries.scene, robot.joint_axes
     own = len(objects) - (0 if scene is None else len(scene.obstacles))
-    discs = [one.geometry.radius if isinstance(one.geometry, coal.Cylinder) else 0.0 for one in objects]
+    discs = [shape.geometry.radius if isinstance(shape.geometry, coal.Cylinder) else 0.0 for shape in objects]
     convex = ConvexShapes(
         boxes=old.boxes,
         planes=old.planes,
@@ -113,7 +113,9 @@ def moved_shapes(robot: Robot, scene: Scene | None) -> MovedShapes:
         pairs=old.pairs,
         between=np.tile(UP, (len(old.pairs), 1)).reshape(-1, 3),
     )
-    carrier = np.array([one.parentJoint if i < own else 0 for i, one in enumerate(objects)], dtype=np.int64)
+    carrier = np.array(
+        [shape.parentJoint if i < own else 0 for i, shape in enumerate(objects)], dtype=np.int64
+    )
     levers, stems = pair_levers(robot, own, carrier, objects, old.boxes, old.pairs)
     return MovedShapes(
         shapes=convex,
@@ -122,7 +124,7 @@ def moved_shapes(robot: Robot, scene: Scene | None) -> MovedShapes:
         planar=np.array(int(robot.platform.n_p >= 3), dtype=np.int64),
         carrier=carrier,
         place=np.array(
-            [as_row(turned[i].inverse() * one.placement) for i, one in zip(carrier, objects, strict=True)]
+            [as_row(turned[i].inverse() * shape.placement) for i, shape in zip(carrier, objects, strict=True)]
         ).reshape(-1, 12),
         levers=levers,
         stems=stems,
@@ -139,7 +141,7 @@ def pair_levers(
     """`levers` and `stems` (2, P, 3 + n) of `MovedShapes`. What a joint moves is no farther from it than the
     lengths between joints, and the travel of sliding ones, together."""
     model, n = robot.model, robot.n
-    lengths = np.array([float(np.linalg.norm(one.translation)) for one in model.jointPlacements])
+    lengths = np.array([float(np.linalg.norm(placement.translation)) for placement in model.jointPlacements])
     travel = np.zeros(model.njoints)
     for joint in range(1, model.njoints):
         c = model.joints[joint].idx_v
@@ -157,8 +159,8 @@ def pair_levers(
             so_far += lengths[joint] + travel[joint]
             joint = int(model.parents[joint])
         far.append(reached)
-    found = np.zeros((2, len(pairs), 3 + n))
-    found[1] = np.inf
+    result = np.zeros((2, len(pairs), 3 + n))
+    result[1] = np.inf
     for k, (i, j) in enumerate(pairs):
         for mover, other in ((i, j), (j, i)):
             if mover >= own:
@@ -167,20 +169,22 @@ def pair_levers(
                 if joint == 0 or (other < own and joint in far[other]):
                     continue
                 c, slides = 3 + model.joints[joint].idx_v, robot.q_units[model.joints[joint].idx_v] == "m"
-                found[0, k, c] = 1.0 if slides else lever
+                result[0, k, c] = 1.0 if slides else lever
                 if other < own and not slides:
-                    shared = next(one for one in far[mover] if one in far[other] and one != joint)
-                    found[1, k, c] = far[other][shared] + _between(model, joint, shared, lengths, travel)
+                    shared = next(
+                        ancestor for ancestor in far[mover] if ancestor in far[other] and ancestor != joint
+                    )
+                    result[1, k, c] = far[other][shared] + _between(model, joint, shared, lengths, travel)
     if robot.platform.n_p >= 3:
-        found[:, :, :3] = found[:, :, 3:6]
-        found[:, :, 3:6] = 0.0
-    return found
+        result[:, :, :3] = result[:, :, 3:6]
+        result[:, :, 3:6] = 0.0
+    return result
 
 
 def _between(model: pin.Model, joint: int, ancestor: int, lengths: Array, travel: Array) -> float:
     """How far a joint's origin can be from an ancestor's, m."""
-    found = 0.0
+    distance = 0.0
     while joint != ancestor:
-        found += float(lengths[joint] + travel[joint])
+        distance += float(lengths[joint] + travel[joint])
         joint = int(model.parents[joint])
-    return found
+    return distance
