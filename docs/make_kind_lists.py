@@ -11,7 +11,7 @@ import re
 import sys
 from pathlib import Path
 
-from nmm.base.kinds import OBJECTIVES, PLATFORMS, REFERENCES, RESOLVERS, TASKS, Kinds
+from nmm.base.kinds import LIMITS, OBJECTIVES, PLATFORMS, REFERENCES, RESOLVERS, TASKS, Kinds
 
 ROOT = Path(__file__).resolve().parent.parent
 STUB = ROOT / "nmm" / "__init__.pyi"
@@ -24,6 +24,7 @@ PAGES: list[tuple[str, Kinds]] = [
     ("reference.md", REFERENCES),
     ("objective.md", OBJECTIVES),
     ("resolver.md", RESOLVERS),
+    ("limit.md", LIMITS),
 ]
 _IMPORT = re.compile(r"from (?P<module>\S+) import (?P<name>\w+) as \w+\n")
 _ENTRY = re.compile(r"\.\. auto\w+:: nmm\.(?:\w+\.)*(?P<name>\w+)\n")

@@ -60,8 +60,11 @@ from .control.functions.tasks.image import LogDepth as LogDepth
 from .control.functions.tasks.measured import MeasuredPoints as MeasuredPoints
 from .control.goal import Goal as Goal
 from .control.limits.collisions import Collisions as Collisions
+from .control.limits.hand_speed import HandSpeed as HandSpeed
+from .control.limits.limit import Limit as Limit
 from .control.limits.limited_function import Bound as Bound
 from .control.limits.limits import Limits as Limits
+from .control.limits.tip_over import TipOver as TipOver
 from .control.resolvers import Answer as Answer
 from .control.resolvers import CallableResolver as CallableResolver
 from .control.resolvers import DampedLeastSquares as DampedLeastSquares

@@ -77,6 +77,13 @@ from .control.integrators import RK4 as RK4
 from .control.integrators import Around as Around
 from .control.integrators import Integrator as Integrator
 from .control.integrators import integrator as integrator
+from .control.limits.limit import LIMIT_ROWS as LIMIT_ROWS
+from .control.limits.limit import LIMIT_VALUES as LIMIT_VALUES
+from .control.limits.limit import LimitRows as LimitRows
+from .control.limits.limit import LimitSample as LimitSample
+from .control.limits.limit import LimitStage as LimitStage
+from .control.limits.limit import RowLimit as RowLimit
+from .control.limits.limit import by_inputs as by_inputs
 from .control.limits.limits import RECOVERY as RECOVERY
 from .control.limits.limits import LimitsOn as LimitsOn
 from .control.plant import Plant as Plant

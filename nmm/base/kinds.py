@@ -1,4 +1,4 @@
-"""Every kind of platform, task, reference, objective and resolver, registered once, by name.
+"""Every kind of platform, task, reference, objective, resolver and limit, registered once, by name.
 
 A class is imported when it is first asked for, so that the names alone cost nothing.
 """
@@ -159,4 +159,9 @@ RESOLVERS = Kinds(
     pg="nmm.control.resolvers.projected_gradient:ProjectedGradient",
     ej="nmm.control.resolvers.extended_jacobian:ExtendedJacobian",
     dls="nmm.control.resolvers.damped_least_squares:DampedLeastSquares",
+)
+LIMITS = Kinds(
+    "limit",
+    hand_speed="nmm.control.limits.hand_speed:HandSpeed",
+    tip_over="nmm.control.limits.tip_over:TipOver",
 )

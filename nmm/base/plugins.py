@@ -30,7 +30,7 @@ SHIPPED = (
     "nmm.plugins.sweeps.plugin:PLUGIN",
 )
 #: What errors call the kinds that a plugin can add.
-KINDS = ("platform", "task", "reference", "objective", "resolver")
+KINDS = ("platform", "task", "reference", "objective", "resolver", "limit")
 #: Longest line about a plugin that fails, in characters.
 LONGEST = 300
 _ENTRY = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
@@ -43,7 +43,7 @@ class Plugin:
     Parameters
     ----------
     name : letters, digits and _; messages call it so
-    kinds : classes by kind, of "platform", "task", "reference", "objective" and "resolver"
+    kinds : classes by kind, of "platform", "task", "reference", "objective", "resolver" and "limit"
     commands : functions that typer takes, by the command's name
     after : the command behind which one of these is listed; the last where none is named
     options : `OptionGroup` classes by the place in one of nmm's commands: "compare", "singularities.formulas"

@@ -72,9 +72,7 @@ def _is_somewhere() -> bool:
 
 
 def _called(arguments: Sequence[str]) -> str:
-    names = [
-        command.name or command.callback.__name__ for command in app.registered_commands if command.callback
-    ]
+    names = [one.name or one.callback.__name__ for one in app.registered_commands if one.callback]
     return f"nmm {arguments[0]}" if arguments and arguments[0] in names else "nmm"
 
 

@@ -24,6 +24,7 @@ def shares(kept: LimitsOn, robot: Robot, q: Array, u: Array, rows: Array) -> tup
     own = robot.following.independent
     names = [*(f"u_{name}" for name in robot.u_names), *(robot.q_names[i] for i in own)]
     units = [*(unit.partition("/")[0] for unit in robot.u_units), *(robot.q_units[i] for i in own)]
+    sizes = [natural_size(unit, robot) for unit in units]
     limits = [*kept.inputs, *kept.coordinates[own]]
     x = [*u.T, *q[:, own].T]
     for row, values in zip(kept.row_limits, rows.T, strict=False):
@@ -31,12 +32,12 @@ def shares(kept: LimitsOn, robot: Robot, q: Array, u: Array, rows: Array) -> tup
         there = [ends for name, ends in zip(names, limits, strict=True) if name == row.name]
         if not any(np.array_equal(row[2:], ends) for ends in there):
             names.append(row.name)
-            units.append(row.unit)
+            sizes.append(kept.sizes.get(row.name, natural_size(row.unit, robot)))
             limits.append(np.array([row.lower, row.upper]))
             x.append(values)
     lower, upper = np.array(limits).T
     some = np.flatnonzero((np.isfinite(lower) | np.isfinite(upper)) & (upper > lower))
-    found = [_share(x[i], lower[i], upper[i], natural_size(units[i], robot)) for i in some]
+    found = [_share(x[i], lower[i], upper[i], sizes[i]) for i in some]
     return tuple(names[i] for i in some), np.array(found).reshape(len(some), len(q)).T
 
 

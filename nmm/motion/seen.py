@@ -13,6 +13,7 @@ from nmm.control.functions.function import Function, Sight
 from nmm.control.functions.program import Program
 from nmm.control.functions.tasks.image import optical_frame
 from nmm.control.functions.tasks.task import Task
+from nmm.control.limits.limit import Limit
 from nmm.control.limits.limits import Limits
 from nmm.model.robots.motion import NORMALISED, PICTURE, Camera
 from nmm.model.robots.robot import Robot
@@ -89,6 +90,8 @@ class SeenPoints:
             first += len(task.rows(robot))
         edges: dict[str, list[Array]] = {}
         for bound in () if limits is None else limits.bounds:
+            if isinstance(bound, Limit):
+                continue
             for camera, sight, points in self._sights(bound.function):
                 _add(found, camera, sight, points, [])
                 kept = np.array([[row.lower, row.upper] for row in bound.rows(robot)])

@@ -6,13 +6,15 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field
 
 from nmm.base.errors import InputError
+from nmm.base.kinds import LIMITS
 from nmm.control.goal import Goal
+from nmm.control.limits.limit import Limit
 from nmm.control.limits.limited_function import Bound
 from nmm.control.limits.limits import Limits
 from nmm.control.retreat import Retreat
 from nmm.control.steering import Steering
 from nmm.model.robots.robot import Robot
-from nmm.scenario.constructors import FunctionPart, MadePart, keys_of
+from nmm.scenario.constructors import FunctionPart, MadePart, keys_of, part_of
 from nmm.scenario.functions import with_functions
 from nmm.scenario.keys import OneOf, Part, each
 from nmm.scenario.numbers import Nested, Number, Numbers, Positive, Speeds, Whole, nested
@@ -45,8 +47,20 @@ class BoundPart(FunctionPart):
         return bound
 
 
-#: By kind: the function's part, with limits.
-BOUND_PARTS = with_functions(BoundPart)
+class LimitPart(MadePart):
+    """A limit of another kind than a function's."""
+
+    def build_bound(self, robot: Robot) -> Limit:
+        with self.own_keys():
+            limit: Limit = self.make()
+            Limits(False, False, bounds=limit).on(robot)
+        return limit
+
+
+#: By kind: limits that are a class of their own.
+LIMIT_PARTS = LIMITS.made(lambda kind, made: part_of(kind, made, LimitPart))
+#: By kind: the function's part, with limits, and those.
+BOUND_PARTS: dict[str, type[BoundPart] | type[LimitPart]] = {**with_functions(BoundPart), **LIMIT_PARTS}
 
 
 def _ranges(value: object) -> object:
@@ -79,8 +93,8 @@ class LimitsPart(
     makes = Limits
     beside = ("bounds",)
 
-    bounds: list[Annotated[BoundPart, OneOf(BOUND_PARTS)]] = Field(
-        default_factory=list, description="functions whose values are kept within limits"
+    bounds: list[Annotated[BoundPart | LimitPart, OneOf(BOUND_PARTS)]] = Field(
+        default_factory=list, description="functions whose values are kept within limits, and further limits"
     )
 
     def build(self, robot: Robot) -> Limits:

@@ -13,7 +13,14 @@ from nmm.scenario.collisions import SHAPE_PARTS, CollisionsPart, ObstaclePart
 from nmm.scenario.disturbances import DisturbancesPart
 from nmm.scenario.functions import FUNCTION_PARTS, REFERENCE_PARTS, CameraFaultsPart
 from nmm.scenario.keys import Part
-from nmm.scenario.limits import BoundPart, GoalPart, LimitsPart, RetreatPart, SteeringPart
+from nmm.scenario.limits import (
+    LIMIT_PARTS,
+    BoundPart,
+    GoalPart,
+    LimitsPart,
+    RetreatPart,
+    SteeringPart,
+)
 from nmm.scenario.objectives import OBJECTIVE_PARTS, TermPart
 from nmm.scenario.resolvers import RESOLVER_PARTS
 from nmm.scenario.robot import ArmPart, MountedPart, RobotPart
@@ -53,6 +60,8 @@ def sections() -> Iterator[Section]:
     yield from _of_plugins()
     yield _section("limits", LimitsPart)
     yield _section("limits.bounds: a task's function and its keys, with these", BoundPart)
+    for kind, part in LIMIT_PARTS.items():
+        yield _section(f"limits.bounds, kind: {kind}", part)
     yield _section("collisions", CollisionsPart)
     yield _section("collisions.obstacles", ObstaclePart)
     yield from _kinds("collisions.obstacles.shape", SHAPE_PARTS)

@@ -28,7 +28,7 @@ from worked_examples import FILES, write_examples
 import nmm
 import nmm.cli.paper
 from nmm.base.bundled import bundled_scenarios
-from nmm.base.kinds import OBJECTIVES, PLATFORMS, REFERENCES, RESOLVERS, TASKS, Kinds
+from nmm.base.kinds import LIMITS, OBJECTIVES, PLATFORMS, REFERENCES, RESOLVERS, TASKS, Kinds
 from nmm.base.plugins import SHIPPED
 from nmm.cli.app import app
 from nmm.cli.exit_status import status_of
@@ -326,7 +326,7 @@ def test_the_python_on_singularities_runs() -> None:
 
 
 @pytest.mark.parametrize(
-    "listed", [PLATFORMS, TASKS, REFERENCES, OBJECTIVES, RESOLVERS], ids=lambda it: it.what
+    "listed", [PLATFORMS, TASKS, REFERENCES, OBJECTIVES, RESOLVERS, LIMITS], ids=lambda it: it.what
 )
 def test_the_contents_list_what_there_is(listed: Kinds) -> None:
     text = (ROOT / "docs" / "contents.md").read_text(encoding="utf-8")

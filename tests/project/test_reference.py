@@ -24,9 +24,9 @@ PUBLIC = ("analysis", "driving", "figures", "playback", "rendering", "ros")
 # fmt: off
 AUTHORS = [
     "AddedJoint", "AnswerArrays", "Dimensions", "Evaluation", "Event", "Function", "Kernel",
-    "Layout", "LimitReport", "LiveNumbers", "MimicJoint", "NamedPostures", "Objective",
+    "Layout", "LimitReport", "LimitStage", "LiveNumbers", "MimicJoint", "NamedPostures", "Objective",
     "PiecewisePolynomial", "PinocchioModels", "Pivot", "Platform", "ProblemArrays", "Quantity",
-    "Residuals", "Resolver", "RollingJoint", "Rollouts", "Row", "Semantics", "Setup", "Shape",
+    "Residuals", "Resolver", "RollingJoint", "Rollouts", "Row", "RowLimit", "Semantics", "Setup", "Shape",
     "Shapes", "Shown", "Stage", "State", "SteeredAxle", "SteeringPivot", "Step", "SweepResult",
     "Table", "Wheel", "WheelDescription", "WheelRate",
 ]

@@ -141,6 +141,7 @@ class Program:
     Parameters
     ----------
     kinematics : PINOCCHIO, in `prepare`, or COMPILED, by `nmm.base.kernels.kinematics` in `run_program`
+    frames : names of further frames whose kinematics the caller reads, at their `slots`
 
     Attributes
     ----------
@@ -161,7 +162,13 @@ class Program:
     costs: tuple[str, ...]
     prepare: Callable[[float, Array], None]
 
-    def __init__(self, robot: Robot, functions: Sequence[Function], kinematics: str = PINOCCHIO) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        functions: Sequence[Function],
+        kinematics: str = PINOCCHIO,
+        frames: Sequence[str] = (),
+    ) -> None:
         self.robot = robot
         self._compiled = kinematics == COMPILED
         self.first_rows: list[int] = []
@@ -176,7 +183,17 @@ class Program:
         live = [stage.live for stage, _ in self._stages]
         self.renewals = tuple(one for one in live if isinstance(one, Renewal))
         self.remembers = any(stage.remembers for stage, _ in self._stages)
-        self._frames = tuple(dict.fromkeys(frame for stage, _ in self._stages for frame in stage.frames))
+        own = [frame for stage, _ in self._stages for frame in stage.frames]
+        self._frames = tuple(dict.fromkeys([*own, *frames]))
+
+    def slots(self, frames: Sequence[str]) -> Integers:
+        """Where the buffers have the kinematics of frames, (frames,)."""
+        return np.array([self._frames.index(frame) for frame in frames], dtype=np.int64)
+
+    def place_after(self, beside: type) -> int:
+        """The place of the first record after its own, with a record of type `beside` at `BESIDE`."""
+        stages = len(self._stages) * header_length(LaidOutStage)
+        return int(BESIDE + header_length(beside) + stages + header_length(Kinematics))
 
     def rows_of(self, functions: int) -> tuple[int, Buffers]:
         """How many stages the first so many functions have, and buffers for them alone."""
@@ -193,8 +210,8 @@ class Program:
         shapes += [(n_p, p), (n_p, p, n_p), (rows,), (rows,), (rows, n)]
         return Buffers(*(np.zeros(shape) for shape in shapes))
 
-    def lay_out(self, beside: tuple[Any, ...] | None = None) -> None:
-        """Allocate, with a record of the caller's, whose place is `BESIDE`."""
+    def lay_out(self, beside: tuple[Any, ...] | None = None, after: Sequence[tuple[Any, ...]] = ()) -> None:
+        """Allocate, with a record of the caller's at `BESIDE`, and others from `place_after` on."""
         robot, platform = self.robot, self.robot.platform
         length = header_length(LaidOutStage)
         first = BESIDE + (0 if beside is None else header_length(type(beside)))
@@ -209,12 +226,14 @@ class Program:
         if beside is not None:
             memory.add(beside)
         for stage, row in self._stages:
-            slots = np.array([self._frames.index(frame) for frame in stage.frames], dtype=np.int64)
+            slots = self.slots(stage.frames)
             bounds = row - stage.before, row + stage.rows
             fixed, kept = (NONE, stage.numbers) if stage.remembers else (stage.numbers, NONE)
             memory.add(LaidOutStage(stage.kernel.address, *bounds, slots, fixed, kept))
         ids = [None if name == CENTER_OF_MASS else robot.frame_id(name) for name in self._frames]
         memory.add(Kinematics(robot.joints, frame_table(robot.model, robot.joint_axes, ids)))
+        for record in after:
+            memory.add(record)
         self.blocks = memory.blocks()
         laid = views(LaidOut, *self.blocks, 0)
         self._kinematics, self._table, self.stands = laid.kinematics, table, laid.stands

@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.base.arrays import counted, infinite, positive
 from nmm.base.errors import InputError, expect, expect_kind, few
 from nmm.control.functions.function import Function
+from nmm.control.limits.limit import RowLimit
 from nmm.model.robots.robot import Robot
-
-
-class Kept(NamedTuple):
-    name: str
-    unit: str
-    lower: float
-    upper: float
 
 
 class Bound:
@@ -81,7 +73,7 @@ class Bound:
     def _who(self) -> str:
         return f"bound {self.name}" if self.name else "bound"
 
-    def rows(self, robot: Robot) -> list[Kept]:
+    def rows(self, robot: Robot) -> list[RowLimit]:
         """Name, unit, lower and upper limit of each component."""
         rows = self.function.rows(robot)
         try:
@@ -93,7 +85,7 @@ class Bound:
                 got=(self.lower, self.upper),
             ) from None
         return [
-            Kept(
+            RowLimit(
                 f"{self.name}.{row.name}" if self.name and len(rows) > 1 else self.name or row.name,
                 *(row.unit, float(lower[i]), float(upper[i])),
             )

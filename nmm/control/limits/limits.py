@@ -11,7 +11,8 @@ from nmm.base.arrays import Array, positive
 from nmm.base.errors import InputError, expect_kind, expect_known, one_or_several
 from nmm.control.functions.tasks.linear_coordinates import LinearCoordinates
 from nmm.control.limits.bounds import SAMPLE, LimitNumbers
-from nmm.control.limits.limited_function import Bound, Kept
+from nmm.control.limits.limit import Limit, RowLimit, checked_stage
+from nmm.control.limits.limited_function import Bound
 from nmm.model.robots.coordinates import UNLIMITED
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.wheel_rates import wheel_rates
@@ -37,7 +38,7 @@ class Limits:
         by per second; for all, or by input or group; None for none
     wheels : largest rolling rates, rad/s: by joint, or one for all but casters; None for the robot's, unless
         velocity=False
-    bounds : limits of functions
+    bounds : limits of functions (`Bound`), and limits of other kinds: `HandSpeed`, `TipOver`
     recovery : speed at which a coordinate returns from beyond its limit, m/s or rad/s
 
     Limits of position and acceleration are kept from sample to sample, so they need the controller's dt.
@@ -64,14 +65,15 @@ class Limits:
         position: Named = True,
         acceleration: Range | Mapping[str, Range] | None = None,
         wheels: float | Mapping[str, float] | None = None,
-        bounds: Sequence[Bound] | Bound = (),
+        bounds: Sequence[Bound | Limit] | Bound | Limit = (),
         recovery: float = RECOVERY,
     ) -> None:
         self.velocity = _named(velocity, "velocity")
         self.position = _named(position, "position")
         self.acceleration = _changes(acceleration)
         self.wheels = _sizes(wheels, "wheels")
-        self.bounds: tuple[Bound, ...] = one_or_several(bounds, Bound, "bounds", "a Bound, or several")
+        expected = "a Bound or another Limit, or several"
+        self.bounds: tuple[Bound | Limit, ...] = one_or_several(bounds, Bound | Limit, "bounds", expected)
         self.recovery = positive(recovery, "recovery")
 
     def on(self, robot: Robot) -> LimitsOn:
@@ -91,8 +93,13 @@ class LimitsOn:
     functions : whose values are limited; braking (f,) : of their components
     wheels (w, 9), spin (w,) : rows of `nmm.model.robots.wheel_rates`, and the wheels' largest rates, the
         first of `rows`, rad/s
-    row_limits, rows : the limits that are rows on the inputs, and their names: first wheels, then functions'
-        components
+    row_limits : the limited quantities, whose values are recorded: first wheels, then functions' components,
+        then those of limits with a kernel of their own
+    rows : the names of the rows on the inputs, in the same order, where a limit may have more than it has
+        quantities; rate_units : by name, what a row's product with the inputs is in
+    stages, counts : of the limits with a kernel of their own, and how many quantities each has
+    first_own : where their rows, and quantities, begin
+    sizes, losses : by name, of `LimitStage`
     priorities : of these, None for those that are kept before any task
     needs_dt : whether there are limits that are kept from sample to sample
     """
@@ -112,24 +119,48 @@ class LimitsOn:
             for i in robot.following.independent
             if i not in self._moved and np.any(np.isfinite(self.coordinates[i]))
         ]
-        bounds = (*held, *limits.bounds)
+        bounds = (*held, *(bound for bound in limits.bounds if isinstance(bound, Bound)))
+        own = [limit for limit in limits.bounds if isinstance(limit, Limit)]
         self.functions = tuple(bound.function for bound in bounds)
         found = [(bound, row) for bound in bounds for row in bound.rows(robot)]
         self._ends = np.array([row[2:] for _, row in found]).reshape(-1, 2)
         self.braking = np.array([np.nan if bound.braking is None else bound.braking for bound, _ in found])
+        self.stages = tuple(checked_stage(limit, robot) for limit in own)
+        quantities = [tuple(limit.rows(robot)) for limit in own]
+        own_rows = list(zip(self.stages, quantities, strict=True))
+        self.counts = tuple(map(len, quantities))
         self.row_limits = (
             *(
-                Kept(name, "rad/s", -spin, spin)
+                RowLimit(name, "rad/s", -spin, spin)
                 for name, spin in zip(wheels, self.spin.tolist(), strict=True)
             ),
             *(row for _, row in found),
         )
-        self.rows = tuple(row.name for row in self.row_limits)
-        self.priorities = (*(None for _ in wheels), *(bound.priority for bound, _ in found))
+        self.first_own = len(self.row_limits)
+        names = [row.name for row in self.row_limits]
+        units = [*("rad/s" for _ in wheels), *(f"{row.unit.removesuffix('/s')}/s" for _, row in found)]
+        self.priorities: tuple[int | None, ...] = (
+            *(None for _ in wheels),
+            *(bound.priority for bound, _ in found),
+        )
+        for limit, stage, kept in zip(own, self.stages, quantities, strict=True):
+            names += [kept[min(i, len(kept) - 1)].name for i in range(stage.rows)]
+            units += [stage.unit] * stage.rows
+            self.priorities += (limit.priority,) * stage.rows
+            self.row_limits += kept
+        self.sizes = {
+            row.name: size for stage, kept in own_rows for row, size in zip(kept, stage.sizes, strict=False)
+        }
+        self.losses = {
+            row.name: loss for stage, kept in own_rows for row, loss in zip(kept, stage.losses, strict=False)
+        }
+        self.rows = tuple(names)
+        self.rate_units = dict(zip(names, units, strict=True))
         self.needs_dt = bool(
             np.any(np.isfinite(self.accelerations))
             or np.any(np.isfinite(self.coordinates[self._moved[self._moved >= 0]]))
             or found
+            or own
         )
 
     def numbers(self, first_rows: Sequence[int], robot: Robot) -> LimitNumbers:

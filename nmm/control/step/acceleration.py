@@ -37,6 +37,7 @@ from nmm.control.step.equations import (
     write_equation,
     write_problem,
 )
+from nmm.control.step.limit_rows import write_rates_beside, write_rows
 
 #: A row whose second difference is beyond this share of 1 + its size jumps.
 JUMPED = 1e-4
@@ -71,6 +72,8 @@ def look_beside(t: float, q: Array, side: int, integers: Integers, floats: Array
         function = e.limits.rows[i]
         times_S(own.buffers.value_q, function, own.buffers.G, e.arm, row)
         own.y[side, s + k + w + i] = own.buffers.value_t[function] + dot(row, u)
+    if e.own_limits.shape[0] > 0:
+        write_rates_beside(t, side, s + k, integers, floats)
 
 
 @compiled
@@ -187,7 +190,12 @@ def write_next_limits(q: Array, integers: Integers, floats: Array) -> None:
         halfway = value + 0.5 * dt * (b.value_t[row] + dot(slope, u))
         problem.upper[w + i] = approach(limits.row_high[i] - halfway, dt, above, recovery) - b.value_t[row]
         problem.lower[w + i] = -approach(halfway - limits.row_low[i], dt, below, recovery) - b.value_t[row]
-    for i in range(w + limits.rows.shape[0]):
+    # u_dot holds for a whole sample, also where the one before was shorter.
+    elapsed = limits.elapsed[()]
+    limits.elapsed[()] = math.nan
+    if e.own_limits.shape[0] > 0:
+        write_rows(q, False, integers, floats)
+    for i in range(problem.lower.shape[0]):
         turned, now = dt * own.D[drift + i], dot(problem.limit_rows[i], u)
         problem.upper[i] = now + (problem.upper[i] - turned - now) / share
         problem.lower[i] = now + (problem.lower[i] - turned - now) / share
@@ -197,9 +205,6 @@ def write_next_limits(q: Array, integers: Integers, floats: Array) -> None:
     for j in range(m):
         if limits.coordinate[j] >= 0:
             ahead[limits.coordinate[j]] += 0.5 * dt * u[j]
-    # u_dot holds for a whole sample, also where the one before was shorter.
-    elapsed = limits.elapsed[()]
-    limits.elapsed[()] = math.nan
     bound_inputs(limits, ahead, problem)
     limits.elapsed[()] = elapsed
     for j in range(m):

@@ -20,6 +20,7 @@ from nmm.control.limits.bounds import (
     wheel_rows,
 )
 from nmm.control.step.equations import BOUNDS, ControlStep, times_S
+from nmm.control.step.limit_rows import write_rows
 
 
 @kernel(BOUNDS)
@@ -42,6 +43,8 @@ def write_limits(q: Array, integers: Integers, floats: Array) -> None:
     if limits.mode[()] == SAMPLE:
         bound_inputs(limits, q, problem)
         function_bounds(limits, b.value, b.value_t, problem)
+    if e.own_limits.shape[0] > 0:
+        write_rows(q, limits.mode[()] != SAMPLE, integers, floats)
 
 
 @kernel(BOUNDS)

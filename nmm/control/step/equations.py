@@ -62,6 +62,9 @@ class ControlStep(NamedTuple):
     q_dot (n,) : S u
     retreat, period : the retreat from a stalled error, and the times of calls
     second : what a controller of second order computes with
+    t () : the time of the sample, s
+    own_limits : where each `LaidOutLimit` is; inputs_before (m,) : the inputs before the sample; without such
+        limits, none
     step : address of `step`, or of `accelerate`, for compiled loops, which contain no copy of it
     limits_code, clearance_code : addresses of `write_limits` and `write_clearance`; 0 where not used
     """
@@ -87,6 +90,9 @@ class ControlStep(NamedTuple):
     retreat: RetreatNumbers
     period: PeriodNumbers
     second: SecondOrder
+    t: Cell
+    own_limits: IntegerVector
+    inputs_before: SampledVector
     step: int
     limits_code: int
     clearance_code: int
@@ -247,6 +253,7 @@ def write_problem(t: float, q: Array, integers: Integers, floats: Array) -> None
     b = views(LaidOut, integers, floats, 0).buffers
     e = views(ControlStep, integers, floats, BESIDE)
     problem = e.problem
+    e.t[()] = t
     write_equation(e.task, b, e.arm, problem.J, problem.rate)
     write_equation(e.added, b, e.arm, problem.added_J, problem.added_rate)
     n = q.shape[0]

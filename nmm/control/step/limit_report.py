@@ -98,6 +98,5 @@ def contradicting(problem: ProblemArrays, inputs: Sequence[str], rows: Sequence[
     prices[some] = np.abs(found.ineqlin.marginals)
     of_rows = prices.reshape(2, count).max(axis=0)
     of_inputs = np.abs(found.lower.marginals[:m]) + np.abs(found.upper.marginals[:m])
-    return tuple(
-        name for name, price in zip([*rows, *inputs], [*of_rows, *of_inputs], strict=True) if price > 1e-9
-    )
+    priced = zip([*rows, *inputs], [*of_rows, *of_inputs], strict=True)
+    return tuple(dict.fromkeys(name for name, price in priced if price > 1e-9))

@@ -16,6 +16,7 @@ from nmm.control.functions.program import BESIDE, LaidOut
 from nmm.control.resolvers.answer import FALLBACK, added_residual
 from nmm.control.resolvers.partitions import COLUMNS
 from nmm.control.step.equations import ControlStep, drive
+from nmm.control.step.limit_rows import note_held_values, note_values
 from nmm.control.step.quantities import QUANTITIES
 
 #: The quantities that only a step knows: `note_sample` writes each.
@@ -82,8 +83,12 @@ def note_sample(
         found.limited[k, i] = 0.0
         for j in range(m):
             found.limited[k, i] += e.problem.limit_rows[i, j] * found.u[k, j]
-    for i in range(w, found.limited.shape[1]):
+    wide = found.limited.shape[1]
+    for i in range(w, min(wide, w + e.limits.rows.shape[0])):
         found.limited[k, i] = b.value[e.limits.rows[i - w]]
+    if wide > 0 and e.own_limits.shape[0] > 0:
+        u, u_dot = view(found.u, k * m, (m,)), view(found.u_dot, k * m, (m,))
+        note_values(q, u, u_dot, integers, floats, view(found.limited, k * wide, (wide,)))
 
 
 NOTE_HELD = void(
@@ -106,6 +111,10 @@ def note_held(integers: Integers, floats: Array, q: Array, u: Array, k: int, fou
         found.u[k, j] = u[j]
     for i in range(e.limits.spin.shape[0] if found.limited.shape[1] > 0 else 0):
         found.limited[k, i] = dot(e.problem.limit_rows[i], u)
+    wide = found.limited.shape[1]
+    if wide > 0 and e.own_limits.shape[0] > 0:
+        held = view(found.u, k * u.shape[0], u.shape)
+        note_held_values(q, held, integers, floats, view(found.limited, k * wide, (wide,)))
 
 
 #: What no sample holds, as a float and as an integer.

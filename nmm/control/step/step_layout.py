@@ -6,7 +6,7 @@ import numpy as np
 
 from nmm.base.arrays import positive
 from nmm.base.errors import InputError, expect_kind, expect_known
-from nmm.base.kernels.record_layout import views
+from nmm.base.kernels.record_layout import header_length, views
 from nmm.control.functions.function import Function, row_scales
 from nmm.control.functions.objectives.base import Objective
 from nmm.control.functions.program import BESIDE, COMPILED, PINOCCHIO, Buffers, Program
@@ -26,6 +26,7 @@ from nmm.control.step.acceleration import accelerate, write_next_limits
 from nmm.control.step.bounded_step import write_clearance, write_limits
 from nmm.control.step.equations import Arm, ControlStep
 from nmm.control.step.equations import step as compiled_step
+from nmm.control.step.limit_rows import LaidOutLimit
 from nmm.control.step.safety_filter import CUTS, MARGIN, Counts
 from nmm.control.step.step_records import SecondOrder, TaskRows
 from nmm.control.step.task_rows import task_functions, task_rows
@@ -114,7 +115,8 @@ def lay_out(given: Given, steered: Steered | None) -> LaidOut:
     pursued = [] if steered is None else [steered.pursuit]
     # At second order the rows that are differenced come first; their kinematics are compiled.
     listed = [*functions, *added, *kept.functions, *objectives, *pursued]
-    program = Program(robot, listed, COMPILED if second else given.kinematics)
+    kinematics = COMPILED if second else given.kinematics
+    program = Program(robot, listed, kinematics, [name for stage in kept.stages for name in stage.frames])
     first = program.first_rows
     after = len(functions) + len(added)
     objective_at = after + len(kept.functions)
@@ -146,9 +148,11 @@ def lay_out(given: Given, steered: Steered | None) -> LaidOut:
     arrays = problem.arrays._replace(limiter=limit.address if limited else 0)
     numbers = kept.numbers(first[after : after + len(kept.functions)], robot)
     arrays.stops[m + len(numbers.spin) :] = UPPER + LOWER
+    arrays.stops[m + kept.first_own : m + len(kept.rows)] = 0  # those of speeds and forces
     dimensions = problem.dimensions
     setup, state = resolver.setup(dimensions), resolver.start(dimensions)
     differenced = len(kept.rows) + s + len(added_rows), objective_at
+    own_limits = _own_limits(kept, program)
     program.lay_out(
         ControlStep(
             near=near,
@@ -174,16 +178,35 @@ def lay_out(given: Given, steered: Steered | None) -> LaidOut:
             retreat=retreat_numbers(given.retreat, robot, rows),
             period=NOT_CALLED,
             second=_second(given, program, first, differenced, kept.bounded) if second else _first(),
+            t=np.array(0.0),
+            own_limits=program.place_after(ControlStep)
+            + header_length(LaidOutLimit) * np.arange(len(own_limits), dtype=np.int64),
+            inputs_before=np.zeros(m if own_limits else 0),
             step=code.address,
             limits_code=limits_code.address if limited else 0,
             clearance_code=write_clearance.address if len(near.d) else 0,
-        )
+        ),
+        own_limits,
     )
     step = views(ControlStep, *program.blocks, BESIDE)
     if second and program.calls_python:
         step.second.h[()] = BESIDE_BY_IN_PYTHON
     state.memory = step.state
     return LaidOut(program, step, dimensions, state, kept, weighted, steered)
+
+
+def _own_limits(kept: LimitsOn, program: Program) -> list[LaidOutLimit]:
+    """The limits with a kernel of their own; their rows come after those of wheels and functions."""
+    laid = []
+    first = quantity = kept.first_own
+    for stage, count in zip(kept.stages, kept.counts, strict=True):
+        ends = first, first + stage.rows, quantity, quantity + count
+        addresses = stage.kernel.address, stage.values.address
+        laid.append(
+            LaidOutLimit(*addresses, *ends, int(stage.rates), program.slots(stage.frames), stage.numbers)
+        )
+        _, first, _, quantity = ends
+    return laid
 
 
 def _second(

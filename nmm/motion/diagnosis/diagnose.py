@@ -37,7 +37,7 @@ DECIDED = (Outcome.COMPLETED, Outcome.MISSED)
 def diagnose(leg: Leg, trajectory: Trajectory, until: Goal | None) -> Verdict | Awaited:
     before, after = tuple((one,) for one in leg.recorder.findings), [*noticed(leg.recorder)]
     into = _into(leg.controller, leg.recorder.swept, trajectory)
-    held = tuple(binding(trajectory)) if trajectory.limited else ()
+    held = tuple(binding(trajectory, leg.controller.solver.limits_on)) if trajectory.limited else ()
 
     def finish(verdicts: Sequence[Verdict]) -> Verdict:
         verdict = _blocked(_reached(verdicts[0], leg, until), leg.recorder)

@@ -82,14 +82,16 @@ def _left(
     return [{"name": name, "t": float(t[k]), "value": float(x[k]), "unit": unit, **known} for k in beyond[:1]]
 
 
-def binding(trajectory: Trajectory) -> Iterator[Finding]:
+def binding(trajectory: Trajectory, kept: LimitsOn) -> Iterator[Finding]:
     """The three limits that most often bind where λ < 1."""
     moving = ~standing(trajectory.robot, trajectory.limit_names, trajectory.shares)
     relaxed = np.any(trajectory.scale < 1.0, axis=1)
     if not relaxed.any() or not moving.any():
         return
     shares = trajectory.shares[relaxed]
-    often = np.where(moving, np.mean(np.minimum(shares, 1.0 - shares) <= AT_LIMIT, axis=0), 0.0)
+    lost = {name: loss / kept.sizes[name] for name, loss in kept.losses.items()}
+    near = AT_LIMIT + np.array([lost.get(name, 0.0) for name in trajectory.limit_names])
+    often = np.where(moving, np.mean(np.minimum(shares, 1.0 - shares) <= near, axis=0), 0.0)
     order = [i for i in np.argsort(-often, kind="stable")[:_SHOWN] if often[i] > 0.0]
     if order:
         limits = {trajectory.limit_names[i]: float(often[i]) for i in order}
@@ -99,14 +101,14 @@ def binding(trajectory: Trajectory) -> Iterator[Finding]:
 def not_kept(recorder: Recorder, controller: Controller) -> Iterator[Finding]:
     """Contradictory limits, retreats, an added task not done, a resolver without an answer."""
     times, found = recorder.t, recorder.so_far
-    units = {row.name: row.unit for row in controller.solver.limits_on.row_limits}
+    units = controller.solver.limits_on.rate_units
     for name in dict.fromkeys(name for beyond in recorder.beyond.values() for name in beyond):
         broken = {k: beyond[name] for k, beyond in recorder.beyond.items() if name in beyond}
         values = {
             "name": name,
             "samples": len(broken),
             "beyond": max(broken.values()),
-            "unit": _of_rates([units.get(name, "m").removesuffix("/s")]),  # no row's is a distance
+            "unit": units.get(name, "m/s"),  # no row's is a distance
             "against": list(recorder.against[name]),
         }
         yield Finding("limit_contradicted", values, {"t": float(times[min(broken)])})

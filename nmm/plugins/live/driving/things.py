@@ -14,6 +14,7 @@ from nmm.control.functions.function import Function, Sight
 from nmm.control.functions.program import evaluate
 from nmm.control.functions.references.live_target import Displaced, LiveTarget
 from nmm.control.functions.tasks.task import Stack
+from nmm.control.limits.limit import Limit
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
 from nmm.motion.seen import same_point
@@ -88,7 +89,7 @@ class Things:
 
     def _moved(self, part: Any) -> Any:
         """A task or a bound whose function sees them."""
-        sight = part.function.shown().sees
+        sight = None if isinstance(part, Limit) else part.function.shown().sees
         if sight is None or sight.of_others is None:
             return part
         away = [self._away.get(self._key(point)) for point in sight.points]
@@ -104,5 +105,7 @@ class Things:
 def _sights(controller: Controller) -> list[Sight]:
     limits = controller.given.limits
     bounds = () if limits is None else limits.bounds
-    found = [one.function.shown().sees for one in (*controller.given.task, *bounds)]
+    functions = (one.function for one in bounds if not isinstance(one, Limit))
+    tasks = (one.function for one in controller.given.task)
+    found = [function.shown().sees for function in (*tasks, *functions)]
     return [sight for sight in found if sight is not None and sight.of_others is not None]
