@@ -127,7 +127,7 @@ class Queries:
     def carry(
         self, pair: int, now: tuple[float, Array], later: tuple[float, Array], rows: Rows, slot: int
     ) -> None:
-        """Write a row of the last `update`: a pair's points nearest at `later`, (t, q), placed as at `now`."""
+        """Write a row of the last `update`: a pair's points nearest at `later`, (t, q), placed at `now`."""
         self.distances(*later, [pair])
         result, ends = self.results[pair, 1:].copy(), self.scene.pairs[pair].tolist()
         points = result[3:].reshape(2, 3)
