@@ -79,9 +79,9 @@ def from_plan(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     s = min(max(share, 0.0), 1.0)
     for j in range(m):
         for i in range(n):
-            one = a + 1 + (2 + j) * n + i
-            change = numbers[one + size] - numbers[one]
-            W = numbers[one] + s * change
+            index = a + 1 + (2 + j) * n + i
+            change = numbers[index + size] - numbers[index]
+            W = numbers[index] + s * change
             rows.value[j] += W * off[i]
             rows.value_t[j] -= W * rate[i]
             if not rests:
@@ -144,7 +144,7 @@ class FromPlan(Function):
         parts = [np.linspace(a, b, 1 + math.ceil((b - a) / KNOT))[:-1] for a, b in pairwise(stops)]
         times = np.concatenate([*parts, [stops[-1], stops[-1] + KNOT]])
         q, u = at(times)
-        q_dot = np.array([robot.S(one) @ rates for one, rates in zip(q, u, strict=True)])
+        q_dot = np.array([robot.S(row) @ rates for row, rates in zip(q, u, strict=True)])
         W = left_inverses(robot, times, q, u, 1.0 / gain, length)
         #: Its knots, as `from_plan` reads them.
         self.knots = np.column_stack([times, q, q_dot, W.reshape(len(q), -1)])
@@ -175,7 +175,7 @@ class FromPlan(Function):
     def apart(self, t: ArrayLike, q: ArrayLike) -> Array:
         """How far configurations (N, n) are from the plan at their times (N,), s: (N, 2), m and rad."""
         off = self.robot.short_way(np.asarray(q, dtype=np.float64) - self.planned(np.asarray(t)))
-        return np.array([error_sizes(one, self.robot.q_units) for one in off]).reshape(-1, 2)
+        return np.array([error_sizes(row, self.robot.q_units) for row in off]).reshape(-1, 2)
 
     def shown(self) -> Shown:
         return Shown(turns=first_tip(self.robot))
@@ -237,9 +237,14 @@ class Renewed(Renewal):
             self._refused.append((t, str(error)))
             return
         # The plan before ends where it was at t.
-        (there,), (u,) = now.at(np.array([t - begun]))
+        (at_end,), (u,) = now.at(np.array([t - begun]))
         before = self._knots[self._knots[:, 0] < t - 1e-6]
-        end = [t, *there, *(new.robot.S(there) @ u), *self._knots[max(len(before) - 1, 0), 1 + 2 * len(q) :]]
+        end = [
+            t,
+            *at_end,
+            *(new.robot.S(at_end) @ u),
+            *self._knots[max(len(before) - 1, 0), 1 + 2 * len(q) :],
+        ]
         after = new.knots + t * (np.arange(new.knots.shape[1]) == 0)
         self._knots = np.vstack([before, end, after]) if len(before) else after
         self._plans.append((t, new))
@@ -249,10 +254,10 @@ class Renewed(Renewal):
         self.set(self._first.table(self._knots[-self._room :], self._room))
 
     def planned(self, t: Array) -> Array:
-        found = np.empty((len(t), self._first.robot.n))
+        configurations = np.empty((len(t), self._first.robot.n))
         for since, function in self._plans:
-            found[t >= since] = function.planned(t[t >= since] - since)
-        return found
+            configurations[t >= since] = function.planned(t[t >= since] - since)
+        return configurations
 
     def noticed(self, end: float) -> Iterator[Finding]:
         if self._made:

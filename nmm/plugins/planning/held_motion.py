@@ -46,9 +46,9 @@ class HeldTiming:
             path = self.held.along(start, legs, TICK / 2**halving, FAR / 2**halving)
             if path.ended != ARRIVED:
                 continue
-            found = self._timed(start, legs, path)
-            if found is not None:
-                return found
+            motions = self._timed(start, legs, path)
+            if motions is not None:
+                return motions
         return None
 
     def _timed(self, start: Array, legs: Array, path: Followed) -> list[SampledMotion] | None:
@@ -90,13 +90,13 @@ class HeldTiming:
         middle[:, arm] = 2.0 * rise[:, moved[arm]] - middle[:, arm]
         half = 0.5 * times[:, np.newaxis]
         at_middle = [
-            self.guide.at(nodes[0], leg, float(one))
-            for one in share[:-1] + times * (3.0 * s[:-1] + s[1:]) / 8.0
+            self.guide.at(nodes[0], leg, float(gone))
+            for gone in share[:-1] + times * (3.0 * s[:-1] + s[1:]) / 8.0
         ]
         between = np.array(at_middle)
         way = 0.5 * half * (u[:-1] + middle)
         between[:, moved[arm]] = nodes[:-1][:, moved[arm]] + way[:, arm]
-        between = np.array([robot.following.placed(one) for one in between])
+        between = np.array([robot.following.placed(row) for row in between])
         q, whole = np.empty((2 * len(times) + 1, robot.n)), np.empty((2 * len(times) + 1, robot.n_u))
         q[::2], q[1::2], whole[::2], whole[1::2] = nodes, between, u, middle
         steps = np.repeat(0.5 * times, 2)
@@ -123,7 +123,7 @@ class HeldTiming:
         begin = motion.samples.begin[::2]
         t = begin[:-1, np.newaxis] + np.diff(begin)[:, np.newaxis] * BETWEEN
         q, _ = motion.at(t.ravel())
-        if any(self.robot.outside(one) or max(self.held.off(one)) > KEPT for one in q):
+        if any(self.robot.outside(row) or max(self.held.off(row)) > KEPT for row in q):
             return False
         straight = nodes[:-1, np.newaxis] + gone[:, :, np.newaxis] * np.diff(nodes, axis=0)[:, np.newaxis]
         first = self.held.platform

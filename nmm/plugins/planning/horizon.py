@@ -122,9 +122,9 @@ class Horizon:
             self._check_steered()
         if self.dt > self._times[1] + 1e-9:
             raise InputError(where="horizon: dt", expected="at most ahead / samples", got=self.dt)
-        given = Collisions() if collisions is None else collisions
-        pairs = len(robot.collision_model.collisionPairs) if given.self_collisions else 0
-        self.scene = given.on(robot) if given.obstacles or pairs else None
+        settings = Collisions() if collisions is None else collisions
+        pairs = len(robot.collision_model.collisionPairs) if settings.self_collisions else 0
+        self.scene = settings.on(robot) if settings.obstacles or pairs else None
         self._check = MotionCheck(robot, self.scene)
         obstacles = () if self.scene is None else self.scene.obstacles
         shapes = 0 if self.scene is None else len(self.scene.queries.shapes.geometryObjects)
@@ -161,21 +161,21 @@ class Horizon:
     def __call__(self, t: float, q: ArrayLike | Mapping[str, float]) -> Array:
         """The inputs (n_u,) at the end of the sample that begins at t, s, with q: limits of acceleration are
         kept where they get there along a straight line."""
-        t, here, x = scalar(t, "t"), self.robot.q(q), self._x
-        self._begin(t, here)
+        t, current, x = scalar(t, "t"), self.robot.q(q), self._x
+        self._begin(t, current)
         self._place_movers(t)
         self._write_aims(t)
         x.margin[:] = MARGIN
         self.solved = self._found()
         if not self.solved and x.ends[0] > 0.0:  # the plan's end, now, is too much to ask
-            self._begin(t, here)
+            self._begin(t, current)
             x.ends[: self.robot.n] = 0.0
             self.solved = self._found()
         if self.solved:
             x.u[-1] = 0.0
             samples = Samples(x.inputs, self._times, x.substeps, x.q, x.u, x.a)
             self._motion, self._begun = SampledMotion(samples, ()), t
-        return self._ahead(t + self.dt, here)[1][0]
+        return self._ahead(t + self.dt, current)[1][0]
 
     def run(
         self,
@@ -204,19 +204,21 @@ class Horizon:
             if not self.solved:
                 unsolved.append(t[-1])
             times = t[-1] + self.dt * np.arange(1, parts + 1) / parts
-            there, inputs = self._ahead(times, seen)
+            configurations, inputs = self._ahead(times, seen)
             if plant is not None:
-                there = plant.go_on(robot, q[-1], u[-1], (inputs[-1] - u[-1]) / self.dt, times - t[-1])
-            t, q, u = [*t, *times.tolist()], [*q, *there], [*u, *inputs]
+                configurations = plant.go_on(
+                    robot, q[-1], u[-1], (inputs[-1] - u[-1]) / self.dt, times - t[-1]
+                )
+            t, q, u = [*t, *times.tolist()], [*q, *configurations], [*u, *inputs]
             sizes = error_sizes(self._error.evaluate(q[-1], t[-1])[2], self._error.rows)
             reached = until is not None and sizes[0] <= until.m and sizes[1] <= until.rad
         count = {"samples": len(unsolved), "of": (len(t) - 1) // parts}
-        warnings = tuple((Finding("horizon_unsolved", count, {"t": one}),) for one in unsolved[:1])
+        warnings = tuple((Finding("horizon_unsolved", count, {"t": time}),) for time in unsolved[:1])
         verdict = Verdict(warnings=warnings)
         if until is not None:
             missed = Finding("not_reached", {"within": t[-1], "m": float(sizes[0]), "rad": float(sizes[1])})
-            found = Finding("reached", {}, {"t": t[-1]}) if reached else missed
-            verdict = Verdict(Outcome.COMPLETED if reached else Outcome.MISSED, (found,), warnings)
+            finding = Finding("reached", {}, {"t": t[-1]}) if reached else missed
+            verdict = Verdict(Outcome.COMPLETED if reached else Outcome.MISSED, (finding,), warnings)
         arrays = np.array(t), np.array(q), np.array(u)
         of = self.task, self.limits, self.scene
         return recorded(robot, *arrays, self.dt / parts, *of, "horizon", verdict)
@@ -255,13 +257,13 @@ class Horizon:
     def _place_movers(self, t: float) -> None:
         """Where obstacles are from t on: by their motions, else along their velocities."""
         x, second = self._x, self._check.pairs[:, 1]
-        for i, (shape, one) in enumerate(self._movers):
-            if one.moves:
-                x.tracks[:, i] = [as_row(one.at(float(time))) for time in t + self._times]
-                far = shifts([one], t + self._times)
+        for i, (shape, obstacle) in enumerate(self._movers):
+            if obstacle.moves:
+                x.tracks[:, i] = [as_row(obstacle.at(float(time))) for time in t + self._times]
+                far = shifts([obstacle], t + self._times)
             else:
-                x.tracks[:, i] = as_row(one.at(t))
-                x.tracks[:, i, 9:] += np.outer(self._times, one.twist(t)[:3])
+                x.tracks[:, i] = as_row(obstacle.at(t))
+                x.tracks[:, i, 9:] += np.outer(self._times, obstacle.twist(t)[:3])
                 far = np.linalg.norm(np.diff(x.tracks[:, i, 9:], axis=0), axis=1)
             x.drift[:, second == shape] = far[:, np.newaxis]
 

@@ -73,32 +73,32 @@ def replan(
         )
     if old.asked.hold is not None:
         raise InputError("a plan that holds something is not replanned", where="replan: plan")
-    here = robot.following.placed(robot.q(q))
-    robot.check_limits(here)
+    start = robot.following.placed(robot.q(q))
+    robot.check_limits(start)
     asked = old.asked
     if obstacles is not None:
         asked = replace(asked, collisions=replace(asked.collisions, obstacles=tuple(obstacles)))
-    if any(one.moves for one in asked.collisions.obstacles):
+    if any(obstacle.moves for obstacle in asked.collisions.obstacles):
         raise InputError("obstacles that move along a path are not replanned for", where="replan: obstacles")
-    search = Search(robot, here, [old.goal], asked, seed)
+    search = Search(robot, start, [old.goal], asked, seed)
     search.begin(positive(seconds, "seconds"), progress)
-    rest = _rest(plan, here, t)
+    rest = _rest(plan, start, t)
     if search.check.too_near(rest[-1]) < 0:
-        search.widen(here, rest[-1])
+        search.widen(start, rest[-1])
     ways = [search.guide.way(a, b) for a, b in pairwise(rest)]
     free = [search.blocked(a, way) < 0 for a, way in zip(rest, ways, strict=False)]
     first = free.index(False) if False in free else len(free)
     last = len(free) - free[::-1].index(False) if False in free else 0
     # What is joined is what begins free: all of it, or up to where something is in the way.
-    joined, join = _join(search, here, rest[: first + 1], ways)
+    joined, join = _join(search, start, rest[: first + 1], ways)
     if joined is not None and first == len(free):
         return finished(search, np.vstack([join, *ways[joined:]]))
     ahead: list[Array] = [] if joined is None else rest[joined : first + 1]
     goals, behind = rest[-1:], rest[last:-1]
     if search.check.too_near(rest[-1]) >= 0:
-        goals, behind = search.ends(old.goal, here), []
-    legs = search.farther(here, goals, ahead, behind)
-    return finished(search, search.shortened(here, legs, counted(shorten, "shorten", 0)))
+        goals, behind = search.ends(old.goal, start), []
+    legs = search.farther(start, goals, ahead, behind)
+    return finished(search, search.shortened(start, legs, counted(shorten, "shorten", 0)))
 
 
 def _rest(plan: Plan, q: Array, t: float | None) -> list[Array]:
@@ -109,14 +109,14 @@ def _rest(plan: Plan, q: Array, t: float | None) -> list[Array]:
         off = plan.robot.short_way(plan(times)[0] - q)
         t = float(times[np.einsum("ki,ki->k", off, off).argmin()])
     begin = min(max(scalar(t, "t"), 0.0), plan.duration)
-    stops = [begin, *(one for one in plan.stops if one > begin)]
+    stops = [begin, *(stop for stop in plan.stops if stop > begin)]
     parts = [np.linspace(a, b, 1 + math.ceil((b - a) / STEP))[:-1] for a, b in pairwise(stops)]
     return list(plan(np.concatenate([*parts, [plan.duration]]))[0])
 
 
 def _join(search: Search, q: Array, rest: Sequence[Array], ways: Sequence[Array]) -> tuple[int | None, Array]:
     """At which of these configurations, joined by ways, the soonest free way from q joins them, and it."""
-    joins = [search.guide.way(q, one) for one in rest]
+    joins = [search.guide.way(q, configuration) for configuration in rest]
     after = np.cumsum([0.0, *(search.guide.times(way).sum() for way in ways[: len(rest) - 1])])
     takes = [float(search.guide.times(join).sum()) for join in joins]
     for k in np.argsort(takes + after[-1] - after):
