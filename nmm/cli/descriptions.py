@@ -58,21 +58,21 @@ def info(
     from nmm.model.robots.loading import load
 
     keywords, texts = loading.keywords(), arguments_of(arguments)
-    given = None
+    loaded = None
     if robot is not None:
-        given = load(robot, arguments=texts, **{"missing_meshes": "skip", **keywords})
+        loaded = load(robot, arguments=texts, **{"missing_meshes": "skip", **keywords})
     without: Sequence[str] | None = None
     if scenario is not None:
         own = [*(keywords[key] for key in ("platform", "axle", "package_dirs", "srdf")), texts]
-        if given is None and any(own):
+        if loaded is None and any(own):
             what = "they are for ROBOT, a scenario has its own"
             raise InputError(what, where="--platform, --axle, --package-dir, --srdf, --set")
-        name, controller, q0 = _of_scenario(scenario, given, keywords)
+        name, controller, q0 = _of_scenario(scenario, loaded, keywords)
         without = inputs_without_effect(controller.solver, q0)
         shown, tasks, steered = controller.robot, [(name, len(controller.rows))], controller.steered
-    elif given is not None:
+    elif loaded is not None:
         tasks = [("position in the plane", 2), ("position in space", 3), ("pose in space", 6)]
-        shown, steered = given, Steering().on(given, ())
+        shown, steered = loaded, Steering().on(loaded, ())
     else:
         raise InputError(expected="ROBOT, a bundled name or a file, or --scenario SCENARIO, which has one")
     _show(shown, tasks)
@@ -137,7 +137,7 @@ def _show(robot: Robot, tasks: Sequence[tuple[str, int]]) -> None:
         known, _ = wheel_rates(robot)
         show_table(
             ["wheel", "radius", "limit", "on", "swivels on", "rollers", "centre there"],
-            [_wheel(wheel, kept=wheel.joint in known) for wheel in robot.wheels],
+            [_wheel(wheel, enforced=wheel.joint in known) for wheel in robot.wheels],
             numeric=["radius"],
         )
         show_text()
@@ -177,12 +177,12 @@ def _limit(value: float) -> str:
     return f"{value + 0.0:.4g}" if isfinite(value) and abs(value) < UNLIMITED else "-"  # no -0
 
 
-def _wheel(wheel: Wheel, *, kept: bool) -> list[str]:
+def _wheel(wheel: Wheel, *, enforced: bool) -> list[str]:
     limit = f"{wheel.velocity:.4g} rad/s" if isfinite(wheel.velocity) else "-"
     return [
         wheel.joint,
         f"{wheel.radius:g} m",
-        limit if kept or limit == "-" else f"{limit}, not kept",
+        limit if enforced or limit == "-" else f"{limit}, not kept",
         "the root's body" if wheel.carrier == "theta" else wheel.carrier,
         wheel.swivel or "-",
         f"{degrees(wheel.roller):g}°" if wheel.roller else "-",

@@ -72,7 +72,9 @@ def _is_somewhere() -> bool:
 
 
 def _called(arguments: Sequence[str]) -> str:
-    names = [one.name or one.callback.__name__ for one in app.registered_commands if one.callback]
+    names = [
+        command.name or command.callback.__name__ for command in app.registered_commands if command.callback
+    ]
     return f"nmm {arguments[0]}" if arguments and arguments[0] in names else "nmm"
 
 

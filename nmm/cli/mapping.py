@@ -108,16 +108,16 @@ def map_measures(
         "weights": values_of(weight, "--weight", "NAME=VALUE, as in platform=4") or None,
         "length": length,
     }
-    given = coordinates_at(what.robot, subject.at)
+    coordinates = coordinates_at(what.robot, subject.at)
     with progress(f"map of {what.name}") as common["progress"]:
         if workspace is None:
             arm = what.robot.u_names[what.robot.platform.p :]
             usual = arm if len(arm) >= 2 else what.robot.q_names
             names = list(usual[:2]) if over is None else names_of(over, "--over")
-            check_held(given, names, "--at")
+            check_held(coordinates, names, "--at")
             made = singularity_map(what.subject, names, samples=counts, **common)
         else:
-            check_given(given, what.subject, frame, what.q, "--at")
+            check_given(coordinates, what.subject, frame, what.q, "--at")
             slab = None if height is None else range_of(height, "--height")
             made = workspace_map(
                 what.subject, frame, plane=workspace, height=slab, samples=counts[0], **common
@@ -158,10 +158,10 @@ def _measure_rows(made: Map, name: str) -> Iterator[list[str]]:
         yield [*row, made.about.units[name] or "-"]
 
 
-def _found(made: Map, those: SingularSet) -> str:
+def _found(made: Map, singular: SingularSet) -> str:
     """Lines, and how many points; in a workspace these are of some postures drawn, not of all."""
-    sampled = made.kind == "workspace" and len(those.points) > 0
-    return those.text() + (", of postures drawn" if sampled else "")
+    sampled = made.kind == "workspace" and len(singular.points) > 0
+    return singular.text() + (", of postures drawn" if sampled else "")
 
 
 def counts_of(text: str) -> tuple[int, int]:

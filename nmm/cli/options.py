@@ -107,33 +107,33 @@ LIMITS = flag(
 )
 
 
-def names_of(given: str, option: str, expected: str = "names with commas between them") -> list[str]:
-    names = [name.strip() for name in given.split(",") if name.strip()]
-    expect(names, option, expected, given)
+def names_of(value: str, option: str, expected: str = "names with commas between them") -> list[str]:
+    names = [name.strip() for name in value.split(",") if name.strip()]
+    expect(names, option, expected, value)
     return names
 
 
-def form_of(given: str | None) -> str | None:
-    expect(given is None or given in _FORMS, "--table", listed(list(_FORMS), "or"), given)
-    return given
+def form_of(value: str | None) -> str | None:
+    expect(value is None or value in _FORMS, "--table", listed(list(_FORMS), "or"), value)
+    return value
 
 
-def settings_of(given: Sequence[str] | None) -> dict[str, object]:
-    return dict(_pairs(given, "--set", "KEY=VALUE, as in resolver.alpha=5"))
+def settings_of(texts: Sequence[str] | None) -> dict[str, object]:
+    return dict(_pairs(texts, "--set", "KEY=VALUE, as in resolver.alpha=5"))
 
 
-def arguments_of(given: Sequence[str] | None) -> dict[str, object]:
-    return dict(_pairs(given, "--set", "ARG=VALUE, as in d=0.5"))
+def arguments_of(texts: Sequence[str] | None) -> dict[str, object]:
+    return dict(_pairs(texts, "--set", "ARG=VALUE, as in d=0.5"))
 
 
 def values_of(
-    given: Sequence[str] | None, option: str, expected: str, read: Callable[[str], Any] | None = None
+    texts: Sequence[str] | None, option: str, expected: str, read: Callable[[str], Any] | None = None
 ) -> dict[str, Any]:
     """Values of a repeatable option NAME=VALUE by name, numbers unless `read` is given; or `InputError`."""
     from nmm.scenario.numbers import evaluate
 
     values: dict[str, Any] = {}
-    for name, text in _pairs(given, option, expected):
+    for name, text in _pairs(texts, option, expected):
         if name in values:
             raise InputError(f"{name} is given twice", where=option)
         try:
@@ -143,11 +143,11 @@ def values_of(
     return values
 
 
-def wheels_of(given: str | None) -> list[str] | dict[str, float] | None:
+def wheels_of(value: str | None) -> list[str] | dict[str, float] | None:
     """The `--wheels` option: joints, or the radius (m) of each; none of them for "none"."""
-    if given is None:
+    if value is None:
         return None
-    names = names_of(given, "--wheels", "JOINT,JOINT,... or JOINT=RADIUS,...")
+    names = names_of(value, "--wheels", "JOINT,JOINT,... or JOINT=RADIUS,...")
     if names == ["none"]:
         return []
     if not any("=" in name for name in names):
@@ -155,23 +155,23 @@ def wheels_of(given: str | None) -> list[str] | dict[str, float] | None:
     return values_of(names, "--wheels", "a radius for each, as in left=0.1,right=0.1, or for none")
 
 
-def axle_of(given: str | None) -> str | list[float] | None:
+def axle_of(value: str | None) -> str | list[float] | None:
     """The `--axle` option: a frame, or x, y (and z), m, and a yaw, rad."""
-    if given is None or ("," not in given and any(letter.isalpha() for letter in given)):
-        return given
+    if value is None or ("," not in value and any(letter.isalpha() for letter in value)):
+        return value
     expected = "a frame, or X,Y[,Z[,YAW]] in m and rad with commas between"
-    expect("," in given, "--axle", expected, given)
+    expect("," in value, "--axle", expected, value)
     from nmm.scenario.numbers import evaluate
 
     try:
-        return [evaluate(part) for part in given.strip("([ ])").split(",")]
+        return [evaluate(part) for part in value.strip("([ ])").split(",")]
     except InputError as error:
-        raise InputError(error.what, where="--axle", expected=expected, got=given) from None
+        raise InputError(error.what, where="--axle", expected=expected, got=value) from None
 
 
-def _pairs(given: Sequence[str] | None, option: str, expected: str) -> list[tuple[str, str]]:
+def _pairs(texts: Sequence[str] | None, option: str, expected: str) -> list[tuple[str, str]]:
     pairs = []
-    for text in given or ():
+    for text in texts or ():
         key, equals, value = text.partition("=")
         expect(equals and key.strip(), option, expected, text)
         pairs.append((key.strip(), value))
@@ -222,10 +222,10 @@ def chosen(text: str, option: str) -> Chosen:
     return Chosen(text, kind, tuple(settings))
 
 
-def named(given: str, option: str, expected: str = EXPECTED) -> list[str]:
-    """As they are given; `InputError` for none, and for one that is given twice."""
-    texts = [text for text in split_outside_brackets(given, ",") if text]
-    expect(texts, option, expected, given)
+def named(value: str, option: str, expected: str = EXPECTED) -> list[str]:
+    """The texts between the commas; `InputError` for none, and for one that is given twice."""
+    texts = [text for text in split_outside_brackets(value, ",") if text]
+    expect(texts, option, expected, value)
     for k, text in enumerate(texts):
         if text in texts[:k]:
             raise _twice(option, text, text)
@@ -234,14 +234,14 @@ def named(given: str, option: str, expected: str = EXPECTED) -> list[str]:
 
 def check_different(resolvers: Sequence[Chosen], scenarios: Sequence[Scenario], option: str) -> None:
     """`InputError` for two that come to the same settings."""
-    found: list[dict[str, Any]] = [scenario.parts.resolver.explicit() for scenario in scenarios]
-    for k, one in enumerate(found):
-        if one in found[:k]:
-            raise _twice(option, resolvers[found.index(one)].text, resolvers[k].text)
+    settings: list[dict[str, Any]] = [scenario.parts.resolver.explicit() for scenario in scenarios]
+    for k, values in enumerate(settings):
+        if values in settings[:k]:
+            raise _twice(option, resolvers[settings.index(values)].text, resolvers[k].text)
 
 
 @contextmanager
-def of_several(several: Sequence[Chosen], one: Chosen, settings: Mapping[str, object]) -> Iterator[None]:
+def of_several(several: Sequence[Chosen], choice: Chosen, settings: Mapping[str, object]) -> Iterator[None]:
     """In the block, an error that is about a key of one resolver says it as `--resolvers` takes it."""
     try:
         yield
@@ -255,8 +255,8 @@ def of_several(several: Sequence[Chosen], one: Chosen, settings: Mapping[str, ob
             raise InputError(what, where=error.where) from None
         match error.mend:
             case Setting(("resolver", key), value):
-                others = dict.fromkeys(other.text for other in several if other is not one)
-                pasted = ",".join([*others, f"{one.text}:{key}={value}"])
+                others = dict.fromkeys(other.text for other in several if other is not choice)
+                pasted = ",".join([*others, f"{choice.text}:{key}={value}"])
                 raise error.placed(error.where, mend=f"--resolvers '{pasted}'") from None
         raise
 
@@ -281,8 +281,8 @@ def _from_file(file: Path, name: str, option: str) -> Resolver:
         names = [key for key, value in vars(module).items() if callable(value) and not key.startswith("_")]
         if name not in vars(module):
             raise no_such("name", name, names)
-        found = getattr(module, name)
-        made = found() if isinstance(found, type) and issubclass(found, Resolver) else found
+        attribute = getattr(module, name)
+        made = attribute() if isinstance(attribute, type) and issubclass(attribute, Resolver) else attribute
     except NmmError as error:
         raise error.at(where, InputError) from None
     except Exception as error:  # whatever someone's file does

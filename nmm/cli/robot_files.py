@@ -77,10 +77,10 @@ def check(
         print(json.dumps(data, indent=1))
         return BAD_INPUT if made.problems else OK
     counts = []
-    for kind, found in (("problem", made.problems), ("warning", made.warnings)):
-        for line in _lines(shown, found, made, "warning: " if kind == "warning" else ""):
+    for kind, findings in (("problem", made.problems), ("warning", made.warnings)):
+        for line in _lines(shown, findings, made, "warning: " if kind == "warning" else ""):
             print(*folded(line), sep="\n")
-        counts.append(counted(len(found), kind) if found else f"no {kind}s")
+        counts.append(counted(len(findings), kind) if findings else f"no {kind}s")
     title = f"{file}: {', '.join(counts)}"
     if made.problems:
         sys.stdout.flush()
@@ -104,25 +104,25 @@ def _touching(robot: Robot) -> tuple[str, dict[tuple[str, str], float]]:
     """How many of the robot's links can touch each other, and which, with how often they do."""
     from nmm.model.collisions.pairs import touching_links
 
-    found = touching_links(robot)
-    if not found.shapes:
+    links = touching_links(robot)
+    if not links.shapes:
         return "no shapes: nothing keeps it from touching anything", {}
-    if not found.shares:
+    if not links.shares:
         return "no two of its links can touch: the model has no pairs", {}
-    counts = f"{len(found.never)} never, {len(found.sometimes)} sometimes, {len(found.always)} always"
+    counts = f"{len(links.never)} never, {len(links.sometimes)} sometimes, {len(links.always)} always"
     summary = (
-        f"{len(found.shares)} pairs of links: {counts} touch, in {found.configurations} random configurations"
+        f"{len(links.shares)} pairs of links: {counts} touch, in {links.configurations} random configurations"
     )
-    return summary, {pair: share for pair, share in found.shares.items() if share > 0.0}
+    return summary, {pair: share for pair, share in links.shares.items() if share > 0.0}
 
 
-def _lines(file: str, found: Sequence[Finding], made: FileReport, kind: str) -> Iterator[str]:
+def _lines(file: str, findings: Sequence[Finding], made: FileReport, kind: str) -> Iterator[str]:
     """Of findings with one code at most `MOST_ALIKE`, and how many more there are."""
     counts = Counter[str]()
-    for one in found:
-        counts[one.code] += 1
-        if counts[one.code] <= MOST_ALIKE:
-            yield _line(file, one, made, kind)
+    for finding in findings:
+        counts[finding.code] += 1
+        if counts[finding.code] <= MOST_ALIKE:
+            yield _line(file, finding, made, kind)
     for code, count in counts.items():
         if count > MOST_ALIKE:
             yield f"{file}: {kind}… {count - MOST_ALIKE} more like these ({code}; all of them: --json)"
@@ -169,13 +169,13 @@ def init(
     from nmm.scenario.scaffold import first_scenario
     from nmm.scenario.scaffold.draft import usual_file
 
-    given = loading.keywords()
+    keywords = loading.keywords()
     for source in (robot, arm):
         if source is not None:
-            source_path(source, given["package_dirs"])  # a wrong name is reported before anything else
+            source_path(source, keywords["package_dirs"])  # a wrong name is reported before anything else
     file = usual_file(robot if arm is None else arm) if out is None else out
     _expect_free(file)
-    draft = first_scenario(robot, arm=arm, at=at, file=file, arguments=arguments_of(settings), **given)
+    draft = first_scenario(robot, arm=arm, at=at, file=file, arguments=arguments_of(settings), **keywords)
     with written_at(f"--out: {file}"):
         _write_new(file, draft.text)
     for line in draft.chosen:

@@ -94,11 +94,11 @@ def run(
 
     if not play:
         browser.refuse("--play")
-    one = None if resolver is None else chosen(resolver, "--resolver")
+    choice = None if resolver is None else chosen(resolver, "--resolver")
     changed, shown_ellipsoids = settings_of(settings), ellipsoids.wanted()
     drawn = figures.options()
-    made = _load(scenario, one, changed, limits, of_robot)
-    label = "" if one is None else one.label
+    made = _load(scenario, choice, changed, limits, of_robot)
+    label = "" if choice is None else choice.label
     called = label or _called(made)
     folder = out or Path("runs") / f"{made.name}-{folder_name(called)}"
     check_folder(folder, is_run)
@@ -194,12 +194,12 @@ def compare(
     drawn: dict[str, Any] = {"ellipsoids": ellipsoids.wanted(), "figures": figures.options()}
     form = form_of(table)
     scenarios = []
-    for one in several:
-        with of_several(several, one, changed):
-            scenarios.append(_load(scenario, one, changed, limits, of_robot))
+    for choice in several:
+        with of_several(several, choice, changed):
+            scenarios.append(_load(scenario, choice, changed, limits, of_robot))
     check_different(several, scenarios, "--resolvers")
     name = scenarios[0].name
-    run_labels = [one.label for one in several]
+    run_labels = [choice.label for choice in several]
     if section := scenarios[0].parts.moved_by:
         scenarios = [scenarios[0], *(made.override(section, False) for made in scenarios)]
         several = [several[0], *several]
@@ -208,8 +208,8 @@ def compare(
     check_folder(folder, comparison.is_comparison)
     # What is wrong with the last one shows before the first one runs.
     controllers = []
-    for made, one in zip(scenarios, several, strict=True):
-        with of_several(several, one, changed):
+    for made, choice in zip(scenarios, several, strict=True):
+        with of_several(several, choice, changed):
             controllers.append(made.controller())
     trajectories: list[Trajectory] = []
     for made, controller, label in zip(scenarios, controllers, run_labels, strict=True):
@@ -303,8 +303,8 @@ def _run(
         try:
             _ = trajectory.findings  # a shorter dt is tried here, where Ctrl-C still ends it
         except KeyboardInterrupt:
-            found = Finding("interrupted_judging")
-            return replace(trajectory, verdict=Verdict(Outcome.INTERRUPTED, (found,)))
+            finding = Finding("interrupted_judging")
+            return replace(trajectory, verdict=Verdict(Outcome.INTERRUPTED, (finding,)))
         return trajectory
 
 

@@ -78,44 +78,44 @@ def singularities(
     from nmm.cli.document import print_json, show
     from nmm.cli.subjects import studied
 
-    given = studied(subject.subject, t=time, **subject.keywords(), **loading.keywords())
+    study = studied(subject.subject, t=time, **subject.keywords(), **loading.keywords())
     if subject.at:  # outside the limits may be asked for, but not by mistake
         try:
-            given.robot.check_limits(given.q)
+            study.robot.check_limits(study.q)
         except InputError as error:
             warn(str(error))
     if looking:
-        search.answer(given, length)
+        search.answer(study, length)
         return
-    choice, left_out = _chosen(given, minors, minor)
-    run = given.trajectory
+    choice, left_out = _chosen(study, minors, minor)
+    run = study.trajectory
     if run is not None and symbolic:
         raise InputError(f"{subject.subject} is a run", where=symbolic, expected="a robot or a scenario")
     if run is not None and time is None and subject.at:
         what = f"{subject.subject} is a run, which is where it was; expected --time"
         raise InputError(what, where="--at")
-    if symbolic and formulas.answer(given, minor) is not None:
+    if symbolic and formulas.answer(study, minor) is not None:
         return
     if run is not None and time is None:
-        history = analyse_along(given.subject, run, length=length, minors=choice)
-        items = [*singularity_history.described(given, run, history, length, left_out)]
-        data = singularity_history.history_data(given, history)
+        history = analyse_along(study.subject, run, length=length, minors=choice)
+        items = [*singularity_history.described(study, run, history, length, left_out)]
+        data = singularity_history.history_data(study, history)
     else:
-        report = analyse(given.subject, given.q, given.t, length=length, minors=choice)
-        items = [*singularity_report.described(given, report, length, left_out)]
-        data = singularity_report.report_data(given, report)
+        report = analyse(study.subject, study.q, study.t, length=length, minors=choice)
+        items = [*singularity_report.described(study, report, length, left_out)]
+        data = singularity_report.report_data(study, report)
     if as_json:
         print_json(data, items)
     else:
         show(items)
 
 
-def _chosen(given: Studied, all_or_none: bool | None, some: Sequence[str] | None) -> tuple[Choice, int]:
+def _chosen(study: Studied, all_or_none: bool | None, some: Sequence[str] | None) -> tuple[Choice, int]:
     if some is not None:
         return list(some), 0
     if all_or_none is not None:
         return all_or_none, 0
     from nmm.analysis.singular.jacobians import stacked
 
-    count = math.comb(given.robot.n_u, len(stacked(given.task).rows(given.robot)))
+    count = math.comb(study.robot.n_u, len(stacked(study.task).rows(study.robot)))
     return (True, 0) if count <= MANY_MINORS else (False, count)

@@ -30,18 +30,18 @@ MOST = 40
 
 
 def described(
-    given: Studied, run: Trajectory, history: SingularityHistory, length: float | None, left_out: int
+    study: Studied, run: Trajectory, history: SingularityHistory, length: float | None, left_out: int
 ) -> Iterator[Item]:
-    yield from header(given)
+    yield from header(study)
     span = f"{run.t[0]:g} to {run.t[-1]:g} s" if len(run) > 1 else f"{run.t[0]:g} s"
     yield f"along a run of {run.resolver.upper()}, {span} in {len(run)} samples ({run.outcome})"
-    rows = stacked(given.task).rows(given.robot)
-    yield from sizes([*(row.unit for row in rows), *given.robot.u_units], length)
+    rows = stacked(study.task).rows(study.robot)
+    yield from sizes([*(row.unit for row in rows), *study.robot.u_units], length)
     yield ""
-    yield _parts(given, history)
+    yield _parts(study, history)
     yield ""
     yield from _verdict(history)
-    of_rg = given.controller is not None and bool(np.all(run.partition >= 0))  # for this very task
+    of_rg = study.controller is not None and bool(np.all(run.partition >= 0))  # for this very task
     if of_rg:
         yield ""
         yield from _partitions(run, history)
@@ -57,9 +57,9 @@ def described(
         yield from _extended(history, history.extended_sigma_min)
 
 
-def history_data(given: Studied, history: SingularityHistory) -> dict[str, Any]:
+def history_data(study: Studied, history: SingularityHistory) -> dict[str, Any]:
     return {
-        **subject_data(given),
+        **subject_data(study),
         **fields(history, "rows inputs t rank condition"),
         "sigma_min": dict(history.sigma_min),
         "extended_sigma_min": history.extended_sigma_min,
@@ -71,8 +71,8 @@ def history_data(given: Studied, history: SingularityHistory) -> dict[str, Any]:
     }
 
 
-def _parts(given: Studied, history: SingularityHistory) -> Table:
-    groups = {**given.robot.groups, "robot": given.robot.u_names}
+def _parts(study: Studied, history: SingularityHistory) -> Table:
+    groups = {**study.robot.groups, "robot": study.robot.u_names}
     largest = float(history.singular_values.max())
     rows = []
     for key, label in without_twins([(name, groups[name]) for name in history.sigma_min]):
@@ -116,8 +116,8 @@ def _partitions(run: Trajectory, history: SingularityHistory) -> Iterator[Item]:
     rows = []
     for first, end in list(pairwise(starts))[:MOST]:
         J = history.J[first:end]
-        whole, found = volume(J), np.abs(determinants(J, np.array([used[first]])))[:, 0]
-        share = np.divide(found, whole, out=np.zeros_like(found), where=whole > 0.0)  # 0 where J lost rank
+        whole, minors = volume(J), np.abs(determinants(J, np.array([used[first]])))[:, 0]
+        share = np.divide(minors, whole, out=np.zeros_like(minors), where=whole > 0.0)  # 0 where J lost rank
         lowest = int(share.argmin())
         begins, ends, at = (f"{run.t[k]:g} s" for k in (first, end - 1, first + lowest))
         columns = block([history.inputs[j] for j in used[first]])
@@ -134,12 +134,19 @@ def _crossings(run: Trajectory | None, history: SingularityHistory) -> Iterator[
     crossings = [crossing for crossing in history.crossings if crossing.columns not in dead]
     if crossings:
         rows = []
-        for one in crossings:
+        for crossing in crossings:
             used = []
             if run is not None:
-                names = [run.robot.u_names[j] for j in run.partition[one.before]]
-                used.append("this one" if set(names) == set(one.columns) else block(names))
-            rows.append([f"{one.t:.4g} s", "+" if one.sign > 0 else "-", minor_name(one.columns), *used])
+                names = [run.robot.u_names[j] for j in run.partition[crossing.before]]
+                used.append("this one" if set(names) == set(crossing.columns) else block(names))
+            rows.append(
+                [
+                    f"{crossing.t:.4g} s",
+                    "+" if crossing.sign > 0 else "-",
+                    minor_name(crossing.columns),
+                    *used,
+                ]
+            )
         columns = ["at", "to", "minor that changes its sign", *(["RG uses"] if run is not None else [])]
         yield Table(columns, rows[:MOST], ["at"])
         if len(rows) > MOST:

@@ -31,14 +31,14 @@ VISIBLE, LARGE = 0.005, 0.1
 MOST_MOTIONS, MOST_ZEROS = 4, 8
 
 
-def header(given: Studied) -> Iterator[Typeset]:
-    robot, tasks = given.robot, stacked(given.task)
-    name = robot.name if given.name == robot.name else f"{given.name}: {robot.name}"
+def header(study: Studied) -> Iterator[Typeset]:
+    robot, tasks = study.robot, stacked(study.task)
+    name = robot.name if study.name == robot.name else f"{study.name}: {robot.name}"
     yield sentence(f"{name}, {robot.platform.name} platform")
     inputs = [(symbol(name), unit) for name, unit in zip(robot.u_names, robot.u_units, strict=True)]
     yield sentence("inputs: ", _with_units(inputs))
     units = [row.unit for row in tasks.rows(robot)]
-    yield sentence("task: ", _with_units(list(zip(row_names(given), units, strict=True))))
+    yield sentence("task: ", _with_units(list(zip(row_names(study), units, strict=True))))
     turned = [task.function for task in tasks if task.function.comparison is not None]
     if turned:
         names = [row.name for function in turned for row in function.rows(robot)]
@@ -46,9 +46,9 @@ def header(given: Studied) -> Iterator[Typeset]:
         yield sentence(f"{rows} are in the frame's own axes")
 
 
-def row_names(given: Studied) -> list[str]:
-    names = [row.name for row in stacked(given.task).rows(given.robot)]
-    return [symbol(name) if name in given.robot.q_names else name for name in names]
+def row_names(study: Studied) -> list[str]:
+    names = [row.name for row in stacked(study.task).rows(study.robot)]
+    return [symbol(name) if name in study.robot.q_names else name for name in names]
 
 
 def _with_units(named: Sequence[tuple[str, str]]) -> Typeset:
@@ -78,10 +78,10 @@ def without_twins(groups: Sequence[tuple[str, tuple[str, ...]]]) -> list[tuple[s
 
 
 def described(
-    given: Studied, report: SingularityReport, length: float | None, left_out: int
+    study: Studied, report: SingularityReport, length: float | None, left_out: int
 ) -> Iterator[Item]:
-    yield from header(given)
-    yield _where(given)
+    yield from header(study)
+    yield _where(study)
     yield from sizes([*report.row_units, *report.input_units], length)
     yield ""
     largest = float(np.abs(report.J).max())
@@ -97,10 +97,10 @@ def described(
     yield _parts(report)
     yield ""
     yield from _verdict(report)
-    yield from _restoring(given, report)
+    yield from _restoring(study, report)
     yield ""
     yield from _minors(report, idle, left_out)
-    of_resolvers = [*_reduced_gradient(given, report)]
+    of_resolvers = [*_reduced_gradient(study, report)]
     if report.extended is not None:
         of_resolvers += _extended(report, report.extended)
     if of_resolvers:
@@ -108,13 +108,13 @@ def described(
     yield from of_resolvers
 
 
-def report_data(given: Studied, report: SingularityReport) -> dict[str, Any]:
-    found, extended = report.partitions, report.extended
+def report_data(study: Studied, report: SingularityReport) -> dict[str, Any]:
+    partitions, extended = report.partitions, report.extended
     restored = "names rates regained effective best best_rate"
     return {
-        **subject_data(given),
+        **subject_data(study),
         **fields(report, "t"),
-        "q": dict(zip(given.robot.q_names, report.q, strict=True)),
+        "q": dict(zip(study.robot.q_names, report.q, strict=True)),
         **fields(report, "rows row_units row_sizes inputs input_units input_sizes J rank singular"),
         **fields(report, "singular_values sigma_min condition"),
         "parts": {
@@ -128,7 +128,7 @@ def report_data(given: Studied, report: SingularityReport) -> dict[str, Any]:
         "partitions": [
             {"inputs": name, "determinant": value, "ratio": ratio, "singular": bool(lost)}
             for name, value, ratio, lost in zip(
-                found.names, found.determinants, found.ratios, found.singular, strict=True
+                partitions.names, partitions.determinants, partitions.ratios, partitions.singular, strict=True
             )
         ],
         "extended": None
@@ -141,18 +141,18 @@ def report_data(given: Studied, report: SingularityReport) -> dict[str, Any]:
     }
 
 
-def subject_data(given: Studied) -> dict[str, Any]:
-    return {"name": given.name, "robot": given.robot.name, "platform": given.robot.platform.name}
+def subject_data(study: Studied) -> dict[str, Any]:
+    return {"name": study.name, "robot": study.robot.name, "platform": study.robot.platform.name}
 
 
-def _where(given: Studied) -> str:
+def _where(study: Studied) -> str:
     """Coordinates that are not 0, angles in degrees too."""
-    robot = given.robot
-    named = zip(robot.q_names, given.q, robot.q_units, strict=True)
+    robot = study.robot
+    named = zip(robot.q_names, study.q, robot.q_units, strict=True)
     parts = [f"{name} = {measured(value, unit)}" for name, value, unit in named if value]
     if len(parts) < robot.n:
         parts.append("the rest 0" if parts else "every coordinate 0")
-    time = f"at t = {given.t:g} s, " if given.t else ""
+    time = f"at t = {study.t:g} s, " if study.t else ""
     return f"{time}where " + ", ".join(parts)
 
 
@@ -196,11 +196,11 @@ def _verdict(report: SingularityReport) -> Iterator[Finding]:
         yield Finding("nothing_given_back")
 
 
-def _restoring(given: Studied, report: SingularityReport) -> Iterator[Finding]:
+def _restoring(study: Studied, report: SingularityReport) -> Iterator[Finding]:
     inputs, singular = report.by_input, report.singular
     if not inputs.effective:
         yield Finding("rank_not_restored" if singular else "sigma_constant")
-        across = [name for name in report.by_coordinate.effective if name in given.robot.platform.coordinates]
+        across = [name for name in report.by_coordinate.effective if name in study.robot.platform.coordinates]
         if singular and across:
             yield Finding("restored_across", {"coordinates": across})
         return
@@ -215,12 +215,14 @@ def _restoring(given: Studied, report: SingularityReport) -> Iterator[Finding]:
         yield Finding("rank_restored_best" if singular else "sigma_grows", best)
 
 
-def _rates(found: Restoration, report: SingularityReport) -> dict[str, Any]:
+def _rates(inputs: Restoration, report: SingularityReport) -> dict[str, Any]:
     """The motions with name, growth of σ_min, per what, directions regained; the strongest first."""
     units = {name: unit.split("/")[0] for name, unit in zip(report.inputs, report.input_units, strict=True)}
-    order = [j for j in np.argsort(-np.abs(found.rates), kind="stable") if found.names[j] in found.effective]
+    order = [
+        j for j in np.argsort(-np.abs(inputs.rates), kind="stable") if inputs.names[j] in inputs.effective
+    ]
     motions = [
-        (found.names[j], float(found.rates[j]), units[found.names[j]], int(found.regained[j]))
+        (inputs.names[j], float(inputs.rates[j]), units[inputs.names[j]], int(inputs.regained[j]))
         for j in order[:MOST_MOTIONS]
     ]
     return {"motions": motions, "more": len(order) - len(motions)}
@@ -232,15 +234,15 @@ def _minors(report: SingularityReport, idle: list[str], left_out: int) -> Iterat
         yield Finding("all_minors_zero", {"count": count})
         return
     if len(minors):
-        found = partition_singularities(
+        partitions = partition_singularities(
             report.J, report.row_scales, minors.columns, report.inputs, report.singular, report.tolerance
         )
-        zeros = [name for name, zero in zip(found.names, found.singular, strict=True) if zero]
+        zeros = [name for name, zero in zip(partitions.names, partitions.singular, strict=True) if zero]
         folded = zeros if len(zeros) > MOST_ZEROS and len(minors) == count else []
         rows = [
             ["0" if zero else number(value), "0" if zero else f"{share:.3g}", minor_name(name)]
             for name, value, share, zero in zip(
-                found.names, found.determinants, found.ratios, found.singular, strict=True
+                partitions.names, partitions.determinants, partitions.ratios, partitions.singular, strict=True
             )
             if name not in folded
         ]
@@ -259,45 +261,45 @@ def _minors(report: SingularityReport, idle: list[str], left_out: int) -> Iterat
         yield Finding("minors_not_listed", {"first": report.inputs[: len(report.rows)]})
 
 
-def _reduced_gradient(given: Studied, report: SingularityReport) -> Iterator[Finding]:
-    found = report.partitions
-    if not found.names:
+def _reduced_gradient(study: Studied, report: SingularityReport) -> Iterator[Finding]:
+    partitions = report.partitions
+    if not partitions.names:
         return
-    if found.kinematic:
+    if partitions.kinematic:
         yield Finding("rg_kinematic")
         return
-    resolver = None if given.controller is None else given.controller.resolver
+    resolver = None if study.controller is None else study.controller.resolver
     values: dict[str, Any] = {"own": isinstance(resolver, ReducedGradient) and not resolver.automatic}
-    singular = {"singular": found.algorithmic, "count": len(found.names)}
-    best = {} if found.best is None else {
-        "best": found.best, "ratio": float(found.ratios[found.names.index(found.best)]),
+    singular = {"singular": partitions.algorithmic, "count": len(partitions.names)}
+    best = {} if partitions.best is None else {
+        "best": partitions.best, "ratio": float(partitions.ratios[partitions.names.index(partitions.best)]),
     }  # fmt: skip
-    if found.exhausted:
+    if partitions.exhausted:
         yield Finding("rg_exhausted", values | singular)
-    elif found.algorithmic:
+    elif partitions.algorithmic:
         yield Finding("rg_algorithmic", values | singular | best)
     else:
         yield Finding("rg_regular", values | best)
 
 
-def _extended(report: SingularityReport, found: ExtendedSingularity) -> Iterator[Finding]:
-    count, largest = len(found.rows), float(found.singular_values[0])
+def _extended(report: SingularityReport, extended: ExtendedSingularity) -> Iterator[Finding]:
+    count, largest = len(extended.rows), float(extended.singular_values[0])
     yield Finding(
         "ej_matrix",
         {
-            "added": found.rows[len(report.rows) :],
-            "determinant": rounded(found.determinant, largest**count),
-            "rank": found.rank,
+            "added": extended.rows[len(report.rows) :],
+            "determinant": rounded(extended.determinant, largest**count),
+            "rank": extended.rank,
             "count": count,
-            "sigma_min": rounded(found.sigma_min, largest),
-            "condition": found.condition,
+            "sigma_min": rounded(extended.sigma_min, largest),
+            "condition": extended.condition,
         },
     )
-    if found.kinematic:
+    if extended.kinematic:
         yield Finding("ej_kinematic")
-    elif found.added_singular:
+    elif extended.added_singular:
         yield Finding("ej_added_singular")
-    elif found.algorithmic:
-        yield Finding("ej_algorithmic", {"lost": _directions(found.lost, found.rows)})
+    elif extended.algorithmic:
+        yield Finding("ej_algorithmic", {"lost": _directions(extended.lost, extended.rows)})
     else:
-        yield Finding("ej_angle", {"measure": found.angle_measure})
+        yield Finding("ej_angle", {"measure": extended.angle_measure})

@@ -64,8 +64,8 @@ def studied(
     robot = loaded if own is None else own.robot
     if own is None and to_drive:
         tasks = tasks or ("position",)
-    given = tuple(short_task(text, robot) for text in tasks or ())
-    if not given and own is None:
+    requested = tuple(short_task(text, robot) for text in tasks or ())
+    if not requested and own is None:
         what = "a robot" if run is None else "a run without a scenario"
         raise InputError(
             f"{source} is {what}: expected --task, as in --task position, --task position:FRAME:xy, "
@@ -79,13 +79,13 @@ def studied(
     else:
         q = robot.rest if scenario is None else robot.q(scenario.parts.q0)
     q = configuration_at(robot, q, at, loading.get("lock") or {})
-    if not given and own is not None and not to_drive:
+    if not requested and own is not None and not to_drive:
         _decide(own, now, q)
     return Studied(
         name=robot.name if scenario is None else scenario.name,
         robot=robot,
-        task=given if given or own is None else own.task,
-        controller=None if given else own,
+        task=requested if requested or own is None else own.task,
+        controller=None if requested else own,
         q=q,
         t=now,
         trajectory=run,
@@ -98,18 +98,18 @@ def scenario_with(scenario: Scenario, loading: Mapping[str, Any]) -> Scenario:
     `InputError` where its robot is mounted from several."""
     from nmm.scenario.robot import RobotPart
 
-    robot, given = scenario.parts.robot, {key: loading[key] for key in _OF_SCENARIO if key in loading}
-    if not given:
+    robot, settings = scenario.parts.robot, {key: loading[key] for key in _OF_SCENARIO if key in loading}
+    if not settings:
         return scenario
     if not isinstance(robot, RobotPart):
         raise InputError(
             f"the robot of {scenario.name} is mounted from several: say of which, as in --set "
             "robot.arm.lock.JOINT=VALUE",
-            where=_options(given),
+            where=_options(settings),
         )
-    if "lock" in given:
-        given["lock"] = {**robot.lock, **given["lock"]}
-    return scenario.with_settings({f"robot.{key}": value for key, value in given.items()})
+    if "lock" in settings:
+        settings["lock"] = {**robot.lock, **settings["lock"]}
+    return scenario.with_settings({f"robot.{key}": value for key, value in settings.items()})
 
 
 def _options(keys: Iterable[str]) -> str:
@@ -148,11 +148,12 @@ def _decide(controller: Controller, t: float, q: Array) -> None:
     controller.switch()
     names, active = schedule.sequence.names, schedule.moment.active
     seen, off = (
-        [one for one, on in zip(names, active, strict=True) if bool(on) is wanted] for wanted in (True, False)
+        [name for name, on in zip(names, active, strict=True) if bool(on) is wanted]
+        for wanted in (True, False)
     )
     if off:
-        here = listed(seen) or "no task"
-        what = f"this is about {here}, active there at t = {t:g} s, and not about {listed(off)}"
+        text = listed(seen) or "no task"
+        what = f"this is about {text}, active there at t = {t:g} s, and not about {listed(off)}"
         warn(f"tasks come and go: {what}")
 
 

@@ -62,15 +62,15 @@ def torques(
         with progress(name) as report:
             run = scenario.run(progress=report)
     expected = "FRAME=KG or FRAME=KG@X,Y,Z, as in ee=1.5"
-    found = run.torques(values_of(payload, "--payload", expected, _load))
+    result = run.torques(values_of(payload, "--payload", expected, _load))
     with shielded():
-        save(found, folder, figures=drawn)
-    for one in found.findings:
-        warn(str(one))
+        save(result, folder, figures=drawn)
+    for finding in result.findings:
+        warn(str(finding))
     if as_json:
-        print_json({**found.summary(), "folder": str(folder)}, [*found.findings])
+        print_json({**result.summary(), "folder": str(folder)}, [*result.findings])
     else:
-        _show(found, folder)
+        _show(result, folder)
     return OK
 
 
@@ -79,39 +79,39 @@ def _load(text: str) -> float | tuple[float, list[float]]:
     from nmm.scenario.numbers import evaluate
 
     mass, at, place = text.partition("@")
-    return (evaluate(mass), [evaluate(one) for one in place.split(",")]) if at else evaluate(mass)
+    return (evaluate(mass), [evaluate(part) for part in place.split(",")]) if at else evaluate(mass)
 
 
-def _show(found: Torques, folder: Path) -> None:
-    said = found.summary()
+def _show(result: Torques, folder: Path) -> None:
+    summary = result.summary()
     rows = [
         [
             name,
-            one["unit"],
-            f"{one['peak']:.3g}",
-            f"{one['t']:.4g} s",
-            f"{one['rms']:.3g}",
-            "none" if one["effort"] is None else f"{one['effort']:.4g}",
-            "" if one["effort"] is None else f"{100 * one['share']:.0f} %",
+            motor["unit"],
+            f"{motor['peak']:.3g}",
+            f"{motor['t']:.4g} s",
+            f"{motor['rms']:.3g}",
+            "none" if motor["effort"] is None else f"{motor['effort']:.4g}",
+            "" if motor["effort"] is None else f"{100 * motor['share']:.0f} %",
         ]
-        for name, one in said["actuators"].items()
+        for name, motor in summary["actuators"].items()
     ]
     columns = ["motor", "unit", "peak", "at", "RMS", "limit", "of it"]
     show_table(columns, rows, numeric=columns[2:])
     show_text()
-    balance, least = "the wheels of its file are too few to say", said["tipping"]
+    balance, least = "the wheels of its file are too few to say", summary["tipping"]
     if least is not None:
         where = f"at {least['t']:.4g} s, over the edge from {' to '.join(least['edge'])}"
         balance = f"{1e3 * least['margin']:.3g} mm to tipping, {where}"
     rows = [
-        ["power", f"{said['power_peak']:.3g} W at most"],
-        ["energy", f"{said['energy']:.4g} J, without what braking gives back"],
+        ["power", f"{summary['power_peak']:.3g} W at most"],
+        ["energy", f"{summary['energy']:.4g} J, without what braking gives back"],
         ["balance", balance],
     ]
-    if said["jumps"]:
-        times = [f"{t:.4g}" for t in said["jumps"]]
+    if summary["jumps"]:
+        times = [f"{t:.4g}" for t in summary["jumps"]]
         more = " …" if len(times) > 5 else ""
         rows.append(["inputs jump", f"after {listed(times[:5])} s{more}: what that takes is not in it"])
-    if said["left_out"]:
-        rows.append(["held still", listed(said["left_out"])])
+    if summary["left_out"]:
+        rows.append(["held still", listed(summary["left_out"])])
     show_table(["", ""], [*rows, ["files in", str(folder)]])

@@ -135,11 +135,11 @@ def _steady_state(rg: Trajectory, pg: Trajectory) -> Claim:
 
 
 def _faster(rg: Trajectory, pg: Trajectory, statement: str, source: str) -> Claim:
-    times, told = _settling(rg, pg, 0.01)
+    times, text = _settling(rg, pg, 0.01)
     return Claim(
         statement,
         source,
-        f"H stays below 1 % of H(0) after {told}; below 0.1 % after {_settling(rg, pg, 0.001)[1]}.",
+        f"H stays below 1 % of H(0) after {text}; below 0.1 % after {_settling(rg, pg, 0.001)[1]}.",
         times[0] is not None and (times[1] is None or times[0] < times[1]),
     )
 
@@ -147,8 +147,8 @@ def _faster(rg: Trajectory, pg: Trajectory, statement: str, source: str) -> Clai
 def _settling(rg: Trajectory, pg: Trajectory, fraction: float) -> tuple[list[float | None], str]:
     """When H falls below a fraction of H(0) for good, as numbers and in words."""
     times = [settling_time(run, fraction) for run in (rg, pg)]
-    told = ["never" if time is None else f"{number_text(time)} s" for time in times]
-    return times, f"{told[0]} (RG), {told[1]} (PG)"
+    texts = ["never" if time is None else f"{number_text(time)} s" for time in times]
+    return times, f"{texts[0]} (RG), {texts[1]} (PG)"
 
 
 def _switching(rg: Trajectory, determinant: float, statement: str, source: str) -> Claim:
@@ -257,12 +257,12 @@ def _third(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
 
 
 def _fourth(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
-    times, told = _settling(rg, pg, 0.01)
+    times, text = _settling(rg, pg, 0.01)
     return [
         Claim(
             "Both methods recover the optimal value of H₄ fast.",
             "Fig. 10",
-            f"H₄ stays below 1 % of H₄(0) after {told}.",
+            f"H₄ stays below 1 % of H₄(0) after {text}.",
             all(time is not None and time < 1.0 for time in times),
         ),
         _switching(

@@ -91,8 +91,8 @@ def write_paper(
             progress(sum(done.values()) / len(done))
 
     with replaced_folder(folder, is_paper, patience=1.0) as temporary:
-        found = share_out(partial(run_case, folder=temporary, figures=shown), list(done), jobs, advance)
-        results = tuple(found[number] for number in sorted(found))
+        by_number = share_out(partial(run_case, folder=temporary, figures=shown), list(done), jobs, advance)
+        results = tuple(by_number[number] for number in sorted(by_number))
         (temporary / "index.html").write_text(render(results), encoding="utf-8")
         holds = all(claim.holds for result in results for claim in result.claims)
         is_paper.write(temporary, {"holds": holds, "cases": [asdict(result) for result in results]})
@@ -121,7 +121,7 @@ def run_case(number: int, progress: Progress, folder: Path, figures: FigureOptio
     case = CASES[number - 1]
     rg, pg = _runs(case, between(progress, 0.0, 0.3))
     determinant = smallest_determinant(rg, _scenario(case, "rg").controller())
-    rows, found = table(rg, pg, determinant), claims(case, rg, pg, determinant)
+    rows, checked = table(rg, pg, determinant), claims(case, rg, pg, determinant)
     own = folder / case.folder
     own.mkdir()
     for k, trajectory in enumerate((rg, pg)):
@@ -131,7 +131,7 @@ def run_case(number: int, progress: Progress, folder: Path, figures: FigureOptio
     progress(0.7)
     write_html([rg, pg], own / "playback.html", title=f"Case {case.number}: {case.title}")
     progress(1.0)
-    return CaseResult(number, tuple(rows), tuple(found), len(rg), time.perf_counter() - began)
+    return CaseResult(number, tuple(rows), tuple(checked), len(rg), time.perf_counter() - began)
 
 
 def _scenario(case: Case, resolver: str) -> Scenario:
@@ -141,15 +141,15 @@ def _scenario(case: Case, resolver: str) -> Scenario:
 
 
 def _runs(case: Case, progress: Progress | None) -> list[Trajectory]:
-    found: list[Trajectory] = []
+    runs: list[Trajectory] = []
     for k, resolver in enumerate(RESOLVERS):
         trajectory = _scenario(case, resolver).run(between(progress, 0.5 * k, 0.5))
         if trajectory.outcome is Outcome.INTERRUPTED:
             raise KeyboardInterrupt
         if not trajectory.complete:
             raise RunError(f"case {case.number} with {resolver.upper()}: {trajectory.message}")
-        found.append(trajectory)
-    return found
+        runs.append(trajectory)
+    return runs
 
 
 def _write_figures(case: Case, rg: Trajectory, pg: Trajectory, folder: Path, figures: FigureOptions) -> None:

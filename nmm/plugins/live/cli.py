@@ -65,13 +65,13 @@ def render(
     from nmm.plugins.live.rendering import render as render_runs
 
     drawn = ellipsoids.wanted()
-    found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", size)
-    if found is None:
+    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", size)
+    if match is None:
         raise InputError(where="--size", expected="WIDTHxHEIGHT, as in 1280x720", got=size)
     runs = runs_in(folder)
     with progress(video.name) as report:
         render_runs(
-            runs, video, size=(int(found[1]), int(found[2])), view=view, fps=fps, speed=speed, start=start,
+            runs, video, size=(int(match[1]), int(match[2])), view=view, fps=fps, speed=speed, start=start,
             end=end, follow=follow, plots=plots, apart=apart, ellipsoids=drawn, progress=report,
         )  # fmt: skip
     show_text(f"written: {video}")
@@ -186,7 +186,7 @@ def _with_arm(
 def _viewable(scenario: Scenario, robot: Robot) -> list[Task | Function] | None:
     """The scenario's tasks; None, and a warning, where they have more rows than there are inputs."""
     tasks: list[Task | Function] = [*scenario.controller().task]
-    rows = sum(len(one.rows(robot)) for one in tasks)
+    rows = sum(len(task.rows(robot)) for task in tasks)
     if rows <= robot.n_u:
         return tasks
     warn(f"no numbers of its tasks: {rows} rows for {robot.n_u} inputs; --task shows some of them")
@@ -214,11 +214,11 @@ def drive(subject: Subject, browser: Browser, loading: Loading) -> None:
     from nmm.plugins.live.driving import drive as drive_in_browser
 
     asked = subject.keywords() | loading.keywords()
-    found = studied(subject.subject, to_drive=True, **asked)
+    study = studied(subject.subject, to_drive=True, **asked)
     setup: DriveSetup
-    if found.controller is None or found.scenario is None:
-        found.robot.check_limits(found.q)
-        setup = RobotSetup(found.robot, tuple(found.task), found.q)
+    if study.controller is None or study.scenario is None:
+        study.robot.check_limits(study.q)
+        setup = RobotSetup(study.robot, tuple(study.task), study.q)
     else:
-        setup = ScenarioSetup(found.scenario, found.q)
+        setup = ScenarioSetup(study.scenario, study.q)
     drive_in_browser(setup, **browser.keywords())

@@ -238,8 +238,8 @@ class LiveRun(RobotSession):
 
     def _known(self) -> float:
         """Time of the last final sample, s."""
-        found = (self._safe(i) for i in reversed(range(len(self._legs))))
-        return next((float(times[-1]) for times in found if len(times)), 0.0)
+        safe_times = (self._safe(i) for i in reversed(range(len(self._legs))))
+        return next((float(times[-1]) for times in safe_times if len(times)), 0.0)
 
     def _safe(self, leg: int) -> Array:
         """Times of a leg's final samples: while a leg goes on, its last one may be taken again."""
@@ -266,14 +266,14 @@ class LiveRun(RobotSession):
 
     def _take(self, leg: Leg, at: Integers) -> None:
         """Take a leg's samples `at`: the robot's place at the last one, and the curves' samples."""
-        found, times = leg.recorder.found, leg.recorder.t
+        recorded, times = leg.recorder.found, leg.recorder.t
         rolled = at[np.unique(np.linspace(0, len(at) - 1, min(len(at), ROLLED)).astype(int))]
-        self.shown.roll(found.q[rolled])
+        self.shown.roll(recorded.q[rolled])
         instants = np.floor(times[at] * KEPT + 1e-6)
-        kept = np.union1d(at[np.diff(instants, prepend=self._instant) > 0], at[-1:])
+        samples = np.union1d(at[np.diff(instants, prepend=self._instant) > 0], at[-1:])
         self._instant = float(instants[-1])
-        self._values += list(self._growing.values(leg.recorder, leg.rows, kept))
-        self._times += times[kept].tolist()
+        self._values += list(self._growing.values(leg.recorder, leg.rows, samples))
+        self._times += times[samples].tolist()
 
     def _state(self, waits: bool) -> str:
         if not self._legs:
@@ -327,8 +327,8 @@ class Growing:
     def values(self, recorder: Recorder, rows: Integers, at: Integers) -> Array:
         """Values (K, channels) at samples `at` (K,) of a recorder with those rows, then the drawn frame's
         position (K, 3), m, and its desired one, as `drawn` has them, then what its cameras see."""
-        found = Recorded._make(whole[at] for whole in recorder.found)
-        record = Record(self._robot, {"t": recorder.t[at], **found._asdict()})
+        recorded = Recorded._make(whole[at] for whole in recorder.found)
+        record = Record(self._robot, {"t": recorder.t[at], **recorded._asdict()})
         known = slice(len(rows))  # without a task, a recorder has a row of its own
 
         def of_all(own: Array) -> Array:
@@ -337,27 +337,27 @@ class Growing:
             return whole
 
         parts = []
-        for one in self._curves:
-            own = getattr(found, one.name) if one.of is None else one.of(record)
-            if one.shape == "Nl":
+        for quantity in self._curves:
+            own = getattr(recorded, quantity.name) if quantity.of is None else quantity.of(record)
+            if quantity.shape == "Nl":
                 own = own[:, : self._levels]
-            parts.append(of_all(own) if one.shape == "Ns" else own)
+            parts.append(of_all(own) if quantity.shape == "Ns" else own)
         if self._partitioned:
-            parts.append(self._partition(found.partition))
-        parts += [found.u, found.q]
+            parts.append(self._partition(recorded.partition))
+        parts += [recorded.u, recorded.q]
         if self._path is not None:
-            place = self._path.positions(found.q)
+            place = self._path.positions(recorded.q)
             parts.append(place)
             if self._shown.rows:
-                parts.append(self._shown.desired(place, of_all(found.r_d)))
+                parts.append(self._shown.desired(place, of_all(recorded.r_d)))
         if not self._seen.calls_python:
-            cameras = self._seen.by_camera(recorder.t[at], found.q, of_all(found.r_d))
-            parts.append(live_numbers(cameras, self._robot, found.q))
+            cameras = self._seen.by_camera(recorder.t[at], recorded.q, of_all(recorded.r_d))
+            parts.append(live_numbers(cameras, self._robot, recorded.q))
         return np.column_stack(parts)
 
     def _partition(self, columns: Integers) -> Array:
-        keys = [tuple(one[one >= 0].tolist()) for one in np.sort(columns, axis=1)]
-        found = [self._numbers.setdefault(key, len(self._numbers)) for key in keys]
+        keys = [tuple(row[row >= 0].tolist()) for row in np.sort(columns, axis=1)]
+        numbers = [self._numbers.setdefault(key, len(self._numbers)) for key in keys]
         new = list(self._numbers)[len(self.partitions) :]
         self.partitions += [partition_text(self._robot, key) for key in new]
-        return np.array(found, dtype=np.float64)
+        return np.array(numbers, dtype=np.float64)

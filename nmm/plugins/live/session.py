@@ -177,9 +177,9 @@ class RobotSession(Session):
     def placed(self, t: float) -> list[str]:
         """Lines that put the robot where it is now, and obstacles that move where they are at t, s."""
         transforms = [
-            [f"/nmm/obstacle {i}", np.array(one.placement(t)).T.ravel().tolist()]
-            for i, one in enumerate(self._obstacles)
-            if one.moves
+            [f"/nmm/obstacle {i}", np.array(obstacle.placement(t)).T.ravel().tolist()]
+            for i, obstacle in enumerate(self._obstacles)
+            if obstacle.moves
         ]
         return [encode({"type": "places", "transforms": transforms}), self.pose()]
 

@@ -88,28 +88,28 @@ class ViewedTask:
             return answer | {"problem": str(error.placed("")), "parts": [], "ellipsoids": [], "arrows": []}
         world = in_world_axes(J, jacobians.task, robot, q)
         lost, near = _directions(world / jacobians.scales[:, np.newaxis])
-        said = lost if len(lost) else near
-        here = Configuration(robot, q)
-        places = [np.array(here.placement(frame.name).translation) for frame in self._frames]
+        directions = lost if len(lost) else near
+        configuration = Configuration(robot, q)
+        places = [np.array(configuration.placement(frame.name).translation) for frame in self._frames]
         return answer | {
-            "state": "lost" if len(lost) else "near" if len(said) else "fine",
-            "words": [direction_words(y, jacobians.rows) for y in said],
+            "state": "lost" if len(lost) else "near" if len(directions) else "fine",
+            "words": [direction_words(y, jacobians.rows) for y in directions],
             "parts": [self._numbers(name, J) for name in self._parts],
             "ellipsoids": list(self._ellipsoids(world, places)),
-            "arrows": [arrow for y in said for arrow in self._arrows(y, places)],
+            "arrows": [arrow for y in directions for arrow in self._arrows(y, places)],
         }
 
     def _numbers(self, name: str, J: Array) -> dict[str, Any]:
         natural, rows = self._jacobians.natural(np.ones(len(J))), self._jacobians.row_names
-        found = part(name, J, self._parts[name], self._robot, rows, TOLERANCE, natural)
+        result = part(name, J, self._parts[name], self._robot, rows, TOLERANCE, natural)
         # Singular values that count as zero are shown as zero.
-        values = np.where(np.arange(len(J)) < found.rank, found.singular_values, 0.0)
+        values = np.where(np.arange(len(J)) < result.rank, result.singular_values, 0.0)
         return {
             "name": name,
-            "rank": found.rank,
+            "rank": result.rank,
             "sigma_min": float(values[-1]),
             "sigma_max": float(values[0]),
-            "condition": found.condition if math.isfinite(found.condition) else None,
+            "condition": result.condition if math.isfinite(result.condition) else None,
             "manipulability": float(np.prod(values)),
         }
 
@@ -163,14 +163,14 @@ class ViewedTask:
 
 
 def _frames(robot: Robot, jacobians: Jacobians) -> list[Frame]:
-    found: dict[str, Frame] = {}
+    frames: dict[str, Frame] = {}
     for i, row in enumerate(jacobians.rows):
         name, _, last = row.name.rpartition(".")
         if name in robot.frames and last in WORLD_PARTS:
-            frame = found.setdefault(name, Frame(name, {}, {}))
+            frame = frames.setdefault(name, Frame(name, {}, {}))
             axis = WORLD_PARTS[last]
             (frame.moves if axis < 3 else frame.turns)[axis % 3] = i
-    return list(found.values())
+    return list(frames.values())
 
 
 def _directions(J: Array) -> tuple[Array, Array]:

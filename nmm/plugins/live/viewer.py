@@ -138,7 +138,7 @@ def _coordinates(robot: Robot, drawn: DrawnRobot, q: Array) -> Iterator[dict[str
     """Each coordinate: its slider or what it follows, its joint's placement at zero in the parent's frame,
     and its screw: for a unit of it the joint turns by `angular` and slides by `linear`."""
     model = robot.display_model
-    mimic_joints = {one.joint: one for one in robot.mimic_joints}
+    mimic_joints = {mimic.joint: mimic for mimic in robot.mimic_joints}
     for i, (name, unit, (lower, upper)) in enumerate(
         zip(robot.q_names, robot.q_units, robot.q_limits, strict=True)
     ):
@@ -213,7 +213,7 @@ def asked_for(scenario: Scenario, robot: Robot) -> Motion:
     frame = shown_frame(tasks, robot)
     path = frame.path(robot, q[np.newaxis])
     desired, target = None, frame.mark(path)
-    if path is not None and frame.rows and not any(one.when for one in tasks):
+    if path is not None and frame.rows and not any(task.when for task in tasks):
         times = np.linspace(0.0, float(scenario.parts.duration), INSTANTS)
         r_d = _references(tasks, robot, q, times)
         known = np.isfinite(r_d[:, list(frame.rows.values())]).all(axis=1)
@@ -230,8 +230,8 @@ def _references(tasks: tuple[Task, ...], robot: Robot, q: Array, times: Array) -
     """Targets (N, s) of the tasks' rows at times, s; NaN where they depend on q."""
     program = Program(robot, [task.reference for task in tasks])
     program.lay_out()
-    found = []
+    values = []
     for t in times:
         rows = program.evaluate(float(t), q)
-        found.append(np.concatenate([np.where(one.value_q.any(axis=1), np.nan, one.value) for one in rows]))
-    return np.array(found)
+        values.append(np.concatenate([np.where(row.value_q.any(axis=1), np.nan, row.value) for row in rows]))
+    return np.array(values)

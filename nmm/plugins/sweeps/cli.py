@@ -79,8 +79,8 @@ def sweep(
     it was. Needs `pip install pyarrow distributed`.
     """
     asked = {"samples": samples, "sampler": sampler, "seed": seed, "keep": keep}
-    given = {name: value for name, value in asked.items() if value is not None}
-    made = _sweep(scenario, vary or (), settings_of(settings), given)
+    keywords = {name: value for name, value in asked.items() if value is not None}
+    made = _sweep(scenario, vary or (), settings_of(settings), keywords)
     folder = out or Path("runs") / f"{made.definition.name}-sweep"
     total, done = made.definition.rows, 0
     with _progress(made) as show:
@@ -102,7 +102,7 @@ def sweep(
     return OK
 
 
-def _sweep(name: str, vary: Sequence[str], settings: dict[str, object], given: dict[str, Any]) -> Sweep:
+def _sweep(name: str, vary: Sequence[str], settings: dict[str, object], keywords: dict[str, Any]) -> Sweep:
     from nmm.base.bundled import bundled_scenarios, bundled_sweeps
     from nmm.plugins.sweeps.definition import parsed
     from nmm.plugins.sweeps.sweep import Sweep, is_sweep_file, read_sweep
@@ -115,15 +115,15 @@ def _sweep(name: str, vary: Sequence[str], settings: dict[str, object], given: d
             raise InputError(f"{key} is given twice", where="--vary")
         varying[key] = text.partition("=")[2].strip()
     if is_sweep_file(name):
-        said = read_sweep(name)
-        changed = {"vary": said["vary"] | varying, "settings": said.get("settings", {}) | settings}
-        return Sweep(**{**said, **given, **changed})
+        in_file = read_sweep(name)
+        changed = {"vary": in_file["vary"] | varying, "settings": in_file.get("settings", {}) | settings}
+        return Sweep(**{**in_file, **keywords, **changed})
     known = {**bundled_scenarios(), **bundled_sweeps()}
     path = Path(name)
     if name not in known and path.suffix not in SUFFIXES and not path.is_file() and len(path.parts) < 2:
         raise no_such("scenario or sweep", name, known)
     expect(varying, "--vary", "at least one key to vary, as in --vary q0.x=-1:1")
-    return Sweep(name, varying, settings=settings, **given)
+    return Sweep(name, varying, settings=settings, **keywords)
 
 
 @contextmanager
@@ -146,8 +146,8 @@ def _progress(made: Sweep) -> Iterator[Callable[[int], None]]:
                 task = bar.add_task(made.definition.name, total=total, completed=rows, speed="")
                 began, first = time.monotonic(), rows
             passed = time.monotonic() - began
-            told = f"{(rows - first) / passed:.3g} a second" if rows > first and passed > 0.0 else ""
-            bar.update(task, completed=rows, speed=told)
+            rate = f"{(rows - first) / passed:.3g} a second" if rows > first and passed > 0.0 else ""
+            bar.update(task, completed=rows, speed=rate)
 
         yield show
 
@@ -178,12 +178,12 @@ def _show(swept: SweepResult) -> None:
             [*beside[0].values, *columns, *best],
             [
                 [
-                    *one.values.values(),
-                    f"{one.completed:.1%}",
-                    *(f"{one.medians[name]:.4g}" if name in one.medians else "-" for name in medians),
-                    *([] if one.best is None else [f"at {one.best:.1%} of the points"]),
+                    *row.values.values(),
+                    f"{row.completed:.1%}",
+                    *(f"{row.medians[name]:.4g}" if name in row.medians else "-" for name in medians),
+                    *([] if row.best is None else [f"at {row.best:.1%} of the points"]),
                 ]
-                for one in beside
+                for row in beside
             ],
             numeric=columns,
         )

@@ -50,14 +50,14 @@ def _check_answers(distributed: Any, address: str) -> None:
             return str((await server.identity()).get("type", ""))
 
     try:
-        found = asyncio.run(kind())
+        node_type = asyncio.run(kind())
     except (OSError, TimeoutError):
         problem = f"no scheduler answers there within {PATIENCE:g} s"
         raise InputError(problem, where=f"--scheduler {address}") from None
     except (ValueError, TypeError) as error:
         expected = "an address such as tcp://127.0.0.1:8786"
         raise InputError(str(error), where="--scheduler", expected=expected, got=address) from None
-    expect(found == "Scheduler", f"--scheduler {address}", "a Dask scheduler", found or "a stranger")
+    expect(node_type == "Scheduler", f"--scheduler {address}", "a Dask scheduler", node_type or "a stranger")
 
 
 def _check_workers(client: Any, address: str) -> None:
@@ -97,13 +97,13 @@ def as_done_by(
     try:
         for future in done:
             try:
-                found = future.result(timeout=PATIENCE)
+                result = future.result(timeout=PATIENCE)
             except NmmError:
                 raise
             except Exception as error:
                 text = f"{type(error).__name__}: {' '.join(str(error).split())}"
                 raise RunError(f"the cluster did not compute a part: {text}") from None
             done.update(following(1))
-            yield numbers.pop(future), found
+            yield numbers.pop(future), result
     finally:
         client.cancel(list(numbers))

@@ -117,16 +117,16 @@ class Definition:
 
     @property
     def ranges(self) -> list[Range]:
-        return [one for one in self.vary if isinstance(one, Range)]
+        return [axis for axis in self.vary if isinstance(axis, Range)]
 
     @property
     def listed(self) -> list[Listed]:
-        return [one for one in self.vary if isinstance(one, Listed)]
+        return [axis for axis in self.vary if isinstance(axis, Listed)]
 
     @property
     def combinations(self) -> int:
         """K, the number of combinations of the listed values; 1 without any."""
-        return prod(len(one.values) for one in self.listed)
+        return prod(len(axis.values) for axis in self.listed)
 
     @property
     def rows(self) -> int:
@@ -146,7 +146,7 @@ class Definition:
 
     def changes(self, indices: Sequence[int]) -> list[dict[str, Any]]:
         """What each of these rows sets in the scenario, by key in the order of `vary`."""
-        return [{key: given for key, (given, _) in row.items()} for row in self._cells(indices)]
+        return [{key: value for key, (value, _) in row.items()} for row in self._cells(indices)]
 
     def parameters(self, indices: Sequence[int]) -> list[dict[str, float | str]]:
         """The same, as the table's cells."""
@@ -161,17 +161,17 @@ class Definition:
         if self.ranges:
             sample = SAMPLERS[self.sampler]
             shares = sample(self.seed, self.samples, len(self.ranges), first, last - first + 1)
-            sampled = {one.key: one.at(shares[:, k]).tolist() for k, one in enumerate(self.ranges)}
+            sampled = {axis.key: axis.at(shares[:, k]).tolist() for k, axis in enumerate(self.ranges)}
         rows = []
         for index in indices:
             point, rest = divmod(index, self.combinations)
             row: dict[str, tuple[Any, float | str]] = {
                 key: (values[point - first], values[point - first]) for key, values in sampled.items()
             }
-            for one in reversed(self.listed):  # the last one changes fastest
-                rest, k = divmod(rest, len(one.values))
-                row[one.key] = one.values[k], one.cells[k]
-            rows.append({one.key: row[one.key] for one in self.vary})
+            for axis in reversed(self.listed):  # the last one changes fastest
+                rest, k = divmod(rest, len(axis.values))
+                row[axis.key] = axis.values[k], axis.cells[k]
+            rows.append({axis.key: row[axis.key] for axis in self.vary})
         return rows
 
     def plain(self) -> dict[str, Any]:
@@ -181,7 +181,7 @@ class Definition:
             "scenario": self.scenario,
             "keys": self.keys,
             "robot": self.robot,
-            "vary": {one.key: one.plain() for one in self.vary},
+            "vary": {axis.key: axis.plain() for axis in self.vary},
         } | {name: getattr(self, name) for name in ("samples", "sampler", "seed", "keep")}
         return json.loads(json.dumps(content, default=str))
 
@@ -246,27 +246,27 @@ SAMPLERS: dict[str, Callable[[int, int, int, int, int], Array]] = {
 }
 
 
-def varied(key: str, given: object) -> Varied:
+def varied(key: str, value: object) -> Varied:
     """What is given for a dotted key, as text or in Python (see `Sweep`); a range with a count becomes values
     at equal distances, with both bounds. `InputError` for bounds that are no numbers, missing or not in
     order, and for fewer than 2 values."""
     expect(key.strip(), "vary", "a dotted key such as q0.x or resolver.alpha", key)
-    if isinstance(given, str):
-        return _from_text(key, given)
-    if isinstance(given, tuple):
-        return _range(key, given, given)
-    values = given.tolist() if hasattr(given, "tolist") else given
+    if isinstance(value, str):
+        return _from_text(key, value)
+    if isinstance(value, tuple):
+        return _range(key, value, value)
+    values = value.tolist() if hasattr(value, "tolist") else value
     if not isinstance(values, list):
         expected = "(lower, upper), (lower, upper, count), a list or text"
-        raise InputError(where=f"vary {key}", expected=expected, got=given)
+        raise InputError(where=f"vary {key}", expected=expected, got=value)
     return _listed(key, values)
 
 
 def parsed(text: str) -> Varied:
     """KEY=LOWER:UPPER[:COUNT] or KEY=VALUE,VALUE,...; `InputError` as `varied`."""
-    key, equals, given = text.partition("=")
+    key, equals, value = text.partition("=")
     expect(equals and key.strip(), "--vary", "KEY=LOWER:UPPER or KEY=VALUE,VALUE,...", text)
-    return varied(key.strip(), given.strip())
+    return varied(key.strip(), value.strip())
 
 
 def _from_text(key: str, text: str) -> Varied:
@@ -285,7 +285,9 @@ def _range(key: str, bounds: Sequence[Any], came: object) -> Varied:
         if isinstance(bound, str) and not bound:
             raise InputError(f"the {name} is missing", where=where, expected=EXPECTED, got=came)
     try:
-        lower, upper, *count = (evaluate(one) if isinstance(one, str) else number(one) for one in bounds)
+        lower, upper, *count = (
+            evaluate(bound) if isinstance(bound, str) else number(bound) for bound in bounds
+        )
     except InputError as error:
         raise error.at(where) from None
     expect(lower < upper, where, "a lower bound below the upper one", came)
@@ -300,7 +302,9 @@ def _range(key: str, bounds: Sequence[Any], came: object) -> Varied:
 
 
 def _listed(key: str, values: Sequence[Any]) -> Listed:
-    plain = [float(one) if isinstance(one, Real) and not isinstance(one, int) else one for one in values]
+    plain = [
+        float(value) if isinstance(value, Real) and not isinstance(value, int) else value for value in values
+    ]
     if len(plain) < 2:
         problem = "one value is no variation: set it" if plain and plain[0] else ""
         raise InputError(problem, where=f"vary {key}", expected=EXPECTED, got=plain[0] if plain else plain)
@@ -313,14 +317,14 @@ def check_varied(scenario: Scenario, vary: tuple[Varied, ...]) -> None:
     """`InputError` for a key that is part of another, `ScenarioError` for one of which no value will do. A
     value valid only beside another one (a threshold with the resolver that has one) will. A start outside
     limits is not looked at here: its row reports it."""
-    for one in vary:
+    for axis in vary:
         for other in vary:
-            if other.key.startswith(f"{one.key}."):
-                what = f"{other.key} is part of {one.key}, which varies too"
+            if other.key.startswith(f"{axis.key}."):
+                what = f"{other.key} is part of {axis.key}, which varies too"
                 raise InputError(what, where="vary", expected="one of them")
-    for one in vary:
+    for axis in vary:
         errors = []
-        for changed in [_changed(scenario, vary, one, value) for value in _tried(one)]:
+        for changed in [_changed(scenario, vary, axis, value) for value in _tried(axis)]:
             try:
                 changed.controller()
                 break
@@ -330,18 +334,18 @@ def check_varied(scenario: Scenario, vary: tuple[Varied, ...]) -> None:
             raise errors[0]
 
 
-def _tried(one: Varied, shares: tuple[float, ...] = SHARES) -> list[Any]:
-    if isinstance(one, Listed):
-        return list(one.values)
-    return [one.lower + share * (one.upper - one.lower) for share in shares]
+def _tried(axis: Varied, shares: tuple[float, ...] = SHARES) -> list[Any]:
+    if isinstance(axis, Listed):
+        return list(axis.values)
+    return [axis.lower + share * (axis.upper - axis.lower) for share in shares]
 
 
-def _changed(scenario: Scenario, vary: tuple[Varied, ...], one: Varied, value: Any) -> Scenario:
+def _changed(scenario: Scenario, vary: tuple[Varied, ...], axis: Varied, value: Any) -> Scenario:
     """The scenario with one value set: alone, or in the first combination of the others that allows it."""
     try:
-        return scenario.with_settings({one.key: value})
+        return scenario.with_settings({axis.key: value})
     except InputError as error:
-        choices = [[value] if other is one else _tried(other, SHARES[:1]) for other in vary]
+        choices = [[value] if other is axis else _tried(other, SHARES[:1]) for other in vary]
         for chosen in islice(product(*choices), MOST_COMBINATIONS):
             try:
                 return scenario.with_settings(dict(zip([each.key for each in vary], chosen, strict=True)))

@@ -56,8 +56,8 @@ class SweepFolder:
         )
         if not is_sweep(self.path):
             return
-        there = json.loads((self.path / is_sweep.file).read_text(encoding="utf-8"))["definition"]
-        difference = _difference(there, self.definition.plain())
+        stored = json.loads((self.path / is_sweep.file).read_text(encoding="utf-8"))["definition"]
+        difference = _difference(stored, self.definition.plain())
         if difference:
             place, was, now = difference
             where, expected = f"{self.path}: {place[1:]}", f"{shown(was)}, or a new folder"
@@ -99,13 +99,13 @@ class SweepFolder:
 
     def damaged(self, chunks: Sequence[int]) -> int:
         """Rows of those chunks whose files are there but damaged."""
-        there = [chunk for chunk in chunks if self._part(chunk).exists()]
-        return sum(len(self.definition.indices(chunk)) for chunk in there)
+        stored = [chunk for chunk in chunks if self._part(chunk).exists()]
+        return sum(len(self.definition.indices(chunk)) for chunk in stored)
 
-    def add(self, chunk: int, found: Computed) -> None:
-        for index, files in found.runs.items():
+    def add(self, chunk: int, result: Computed) -> None:
+        for index, files in result.runs.items():
             self._write_run(self.path / f"runs/{index:09d}", files)
-        table = arrow().Table.from_pylist(found.rows, schema=self._schema)
+        table = arrow().Table.from_pylist(result.rows, schema=self._schema)
         with whole_file(self._part(chunk)) as temporary:
             parquet().write_table(table, temporary)
 
@@ -143,11 +143,11 @@ class SweepFolder:
             shutil.rmtree(temporary, ignore_errors=True)
 
 
-def _difference(there: Any, here: Any, place: str = "") -> tuple[str, Any, Any] | None:
+def _difference(stored: Any, current: Any, place: str = "") -> tuple[str, Any, Any] | None:
     """The first key where two definitions differ, and both values, None for a missing one."""
-    if not (isinstance(there, dict) and isinstance(here, dict)):
-        return None if there == here else (place, there, here)
-    inner = (_difference(there.get(key), here.get(key), f"{place}.{key}") for key in there | here)
+    if not (isinstance(stored, dict) and isinstance(current, dict)):
+        return None if stored == current else (place, stored, current)
+    inner = (_difference(stored.get(key), current.get(key), f"{place}.{key}") for key in stored | current)
     return next(filter(None, inner), None)
 
 

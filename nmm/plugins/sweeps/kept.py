@@ -17,7 +17,7 @@ from nmm.control.step.quantities import saved
 from nmm.control.step.recorded import Recorded
 
 #: Quantities of a sample that can be kept, named as in a trajectory.
-QUANTITIES = (*(one.name for one in saved() if one.noted), "believed")
+QUANTITIES = (*(quantity.name for quantity in saved() if quantity.noted), "believed")
 #: Largest size of a part's file, bytes.
 PART = 64e6
 #: What `measure` writes, in order. Norms are over the task's rows in their mixed units, as in a summary.
@@ -66,7 +66,7 @@ class Kept:
         self.t = times[::every].copy()
         like = {**shapes._asdict(), "believed": shapes.q}
         self._each = {name: like[name][::every] for name in names}
-        of_one = sum(one.nbytes for one in self._each.values())
+        of_one = sum(array.nbytes for array in self._each.values())
         self.part = count if folder is None else max(1, min(count, int(PART / max(of_one, 1))))
         expect_memory(
             of_one * self.part,
@@ -78,15 +78,15 @@ class Kept:
     def room(self, runs: int) -> dict[str, Array]:
         """Arrays for so many runs, filled with NaN (-1 for integers)."""
         return {
-            name: np.full((runs, *one.shape), -1 if one.dtype.kind == "i" else np.nan, dtype=one.dtype)
-            for name, one in self._each.items()
+            name: np.full((runs, *array.shape), -1 if array.dtype.kind == "i" else np.nan, dtype=array.dtype)
+            for name, array in self._each.items()
         }
 
     def put(
-        self, room: dict[str, Array], row: int, found: Recorded, believed: Array | None, count: int
+        self, room: dict[str, Array], row: int, recorded: Recorded, believed: Array | None, count: int
     ) -> None:
-        """Of a run; believed (N, n): what its controller takes q for, q itself if None."""
-        of_run = {**found._asdict(), "believed": found.q if believed is None else believed}
+        """Write a run into `room`; believed (N, n): what its controller takes q for, q itself if None."""
+        of_run = {**recorded._asdict(), "believed": recorded.q if believed is None else believed}
         for name, whole in room.items():
             some = of_run[name][: count : self._every]
             whole[row, : len(some)] = some
@@ -110,7 +110,7 @@ def least_singular_value(J: Array, count: int) -> float:
     at most J's change in the Frobenius norm (Weyl 1912), so a matrix that near to the last one decomposed
     that its own stays above the least so far is skipped."""
     s, m = J.shape[1], J.shape[2]
-    found = scratch(min(s, m))
+    sigma = scratch(min(s, m))
     least = math.inf
     for stride in STRIDES:
         last = -1
@@ -120,51 +120,51 @@ def least_singular_value(J: Array, count: int) -> float:
                 for i in range(s):
                     for j in range(m):
                         square += (J[k, i, j] - J[last, i, j]) ** 2
-                if found[found.shape[0] - 1] - math.sqrt(square) > least + ROUNDING * found[0]:
+                if sigma[sigma.shape[0] - 1] - math.sqrt(square) > least + ROUNDING * sigma[0]:
                     continue
-            write_spectrum(view(J, k * s * m, (s, m)), found)
-            least, last = min(least, found[found.shape[0] - 1]), k
+            write_spectrum(view(J, k * s * m, (s, m)), sigma)
+            least, last = min(least, sigma[sigma.shape[0] - 1]), k
     return least
 
 
 @compiled_without_gil
-def measure(times: Array, count: int, found: Recorded, out: Array) -> None:
+def measure(times: Array, count: int, recorded: Recorded, out: Array) -> None:
     """Write the measures (len(MEASURES),) of the first `count` samples into `out`; NaN if there are none."""
     for i in range(out.shape[0]):
         out[i] = math.nan
     if count == 0:
         return
-    s, m = found.error.shape[1], found.u.shape[1]
+    s, m = recorded.error.shape[1], recorded.u.shape[1]
     errors, inputs, H, effort = 0.0, 0.0, 0.0, 0.0
     largest, peak, missed, scale, switches = 0.0, 0.0, 0.0, math.inf, 0
     before, norm = 0.0, 0.0
     for k in range(count):
         square, size = 0.0, 0.0
         for i in range(s):
-            square += found.error[k, i] * found.error[k, i]
+            square += recorded.error[k, i] * recorded.error[k, i]
         for j in range(m):
-            size += found.u[k, j] * found.u[k, j]
+            size += recorded.u[k, j] * recorded.u[k, j]
         norm = math.sqrt(square)
         if k == 0:
             out[1] = norm
         else:
             dt = times[k] - times[k - 1]
-            H += 0.5 * dt * (found.objective[k] + found.objective[k - 1])
+            H += 0.5 * dt * (recorded.objective[k] + recorded.objective[k - 1])
             effort += 0.5 * dt * (size + before)
             changed = 0
             for i in range(s):
-                if found.partition[k, i] != found.partition[k - 1, i]:
+                if recorded.partition[k, i] != recorded.partition[k - 1, i]:
                     changed = 1
             switches += changed
         before = size
         errors += square
         inputs += size
         largest, peak = max(largest, norm), max(peak, math.sqrt(size))
-        missed = max(missed, found.residual[k])
-        for level in range(found.scale.shape[1]):
-            scale = min(scale, found.scale[k, level])
+        missed = max(missed, recorded.residual[k])
+        for level in range(recorded.scale.shape[1]):
+            scale = min(scale, recorded.scale[k, level])
     out[0] = times[count - 1]
     out[2], out[3], out[4] = norm, math.sqrt(errors / count), largest
-    out[5], out[6] = found.objective[count - 1], H
-    out[7], out[8], out[9], out[10] = least_singular_value(found.J, count), missed, scale, switches
+    out[5], out[6] = recorded.objective[count - 1], H
+    out[7], out[8], out[9], out[10] = least_singular_value(recorded.J, count), missed, scale, switches
     out[11], out[12], out[13] = math.sqrt(inputs / count), peak, effort

@@ -73,7 +73,7 @@ class SweepResult:
     def outcomes(self) -> dict[str, int]:
         """How many rollouts ended how, the most frequent first."""
         counts = self.table["outcome"].value_counts().to_pylist()
-        return {one["values"]: one["counts"] for one in sorted(counts, key=lambda one: -one["counts"])}
+        return {row["values"]: row["counts"] for row in sorted(counts, key=lambda row: -row["counts"])}
 
 
 class Compared(NamedTuple):
@@ -108,14 +108,14 @@ def compared(swept: SweepResult) -> list[Compared]:
     if not 2 <= count <= MOST_COMPARED:
         return []
     table = swept.table
-    completed = np.array([one == "completed" for one in table["outcome"].to_pylist()]).reshape(-1, count)
+    completed = np.array([end == "completed" for end in table["outcome"].to_pylist()]).reshape(-1, count)
     names = ("error_rms", "objective_integral", "effort")
     by = {name: column(table, name).reshape(-1, count) for name in names}
     H = by["objective_integral"]
     both = H[completed.all(axis=1)]
     least = np.argmin(both, axis=1) if len(both) > 1 and np.ptp(H[np.isfinite(H)]) > 0.0 else None
-    keys = {one.key for one in definition.listed}
-    found = []
+    keys = {axis.key for axis in definition.listed}
+    comparisons = []
     for k, row in enumerate(definition.parameters(range(count))):
         medians = {
             name: float(np.median(known))
@@ -124,8 +124,8 @@ def compared(swept: SweepResult) -> list[Compared]:
         }
         best = None if least is None else float(np.mean(least == k))
         values = {key: v if isinstance(v, str) else f"{v:.6g}" for key, v in row.items() if key in keys}
-        found.append(Compared(values, float(completed[:, k].mean()), medians, best))
-    return found
+        comparisons.append(Compared(values, float(completed[:, k].mean()), medians, best))
+    return comparisons
 
 
 def write_page(swept: SweepResult, units: Mapping[str, str]) -> None:
@@ -152,14 +152,14 @@ def _about(definition: Definition) -> str:
     text = f"{definition.rows} rollouts of {definition.scenario}: "
     parts = []
     if definition.ranges:
-        keys = [f"{one.key} from {one.lower:.4g} to {one.upper:.4g}" for one in definition.ranges]
+        keys = [f"{axis.key} from {axis.lower:.4g} to {axis.upper:.4g}" for axis in definition.ranges]
         how = f"{definition.samples} points ({definition.sampler}, seed {definition.seed})"
         parts.append(f"{how} of {listed(keys)}")
     parts += [
-        f"{one.key} {listed([f'{value}' for value in one.cells], 'or')}"
-        if len(one.cells) <= 6
-        else f"{len(one.cells)} values of {one.key}, from {one.cells[0]} to {one.cells[-1]}"
-        for one in definition.listed
+        f"{axis.key} {listed([f'{value}' for value in axis.cells], 'or')}"
+        if len(axis.cells) <= 6
+        else f"{len(axis.cells)} values of {axis.key}, from {axis.cells[0]} to {axis.cells[-1]}"
+        for axis in definition.listed
     ]
     return text + "; ".join(parts) + "."
 
@@ -172,7 +172,7 @@ def _data(swept: SweepResult, units: Mapping[str, str]) -> dict[str, Any]:
     points = definition.samples > every
     rows = [i for i in range(definition.rows) if (i // count if points else i) % every == 0]
     shown = table.take(rows)
-    listed_keys, varied = {one.key for one in definition.listed}, {one.key for one in definition.vary}
+    listed_keys, varied = {axis.key for axis in definition.listed}, {axis.key for axis in definition.vary}
     return {
         "shown": len(rows),
         "command": definition.command(0)[: 3 + 2 * len(definition.settings)],

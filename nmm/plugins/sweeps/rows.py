@@ -79,18 +79,20 @@ _FIRST = (
 
 def _measured_columns() -> Iterator[Column]:
     """Those of the summary's numbers, which may have the units of rows or inputs, and two of sweeps alone."""
-    for one in placed():
-        unit = "" if one.unit in ("rows", "inputs", "coordinates") else one.unit
-        for number in one.numbers:
+    for quantity in placed():
+        unit = "" if quantity.unit in ("rows", "inputs", "coordinates") else quantity.unit
+        for number in quantity.numbers:
             if number.about:
-                yield Column(number.key, "count" if one.whole else "number", unit, number.about)
-    yield from (Column(one.key, "number", one.unit, one.about) for one in RUN_NUMBERS if one.about)
+                yield Column(number.key, "count" if quantity.whole else "number", unit, number.about)
+    yield from (
+        Column(number.key, "number", number.unit, number.about) for number in RUN_NUMBERS if number.about
+    )
     settled = "with `until` when it was there; without, from when on ‖e‖ < 2 % of its start"
     yield Column("arrival", "number", "s", settled)
     yield Column("effort", "number", "", "∫ ‖u‖² dt")
 
 
-_COLUMNS = {one.name: one for one in _measured_columns()}
+_COLUMNS = {column.name: column for column in _measured_columns()}
 MEASURED = (
     Column(
         "outcome", "text", "", "how the rollout ended (docs/outcomes.md); refused: what varies is invalid"
@@ -103,8 +105,8 @@ MEASURED = (
 
 def columns_of(definition: Definition) -> list[Column]:
     parameters = [
-        Column(one.key, "text" if isinstance(one, Listed) and not one.numbers else "number", "", "varied")
-        for one in definition.vary
+        Column(axis.key, "text" if isinstance(axis, Listed) and not axis.numbers else "number", "", "varied")
+        for axis in definition.vary
     ]
     peaks = [
         Column(f"u_max.{name}", "number", "", f"largest |{name}|, per second") for name in definition.inputs
@@ -114,12 +116,12 @@ def columns_of(definition: Definition) -> list[Column]:
 
 def measured(trajectory: Trajectory) -> dict[str, Any]:
     summary = trajectory.summary(motors=False)
-    found = {column.name: summary.get(column.name) for column in MEASURED}
-    found["warnings"] = len(summary["warnings"])
+    cells = {column.name: summary.get(column.name) for column in MEASURED}
+    cells["warnings"] = len(summary["warnings"])
     if len(trajectory):
-        found["arrival"] = _arrival(trajectory, summary)
-        found["effort"] = float(np.trapezoid(np.sum(trajectory.u**2, axis=1), trajectory.t))
-    return found | {f"u_max.{name}": value for name, value in summary.get("u_max", {}).items()}
+        cells["arrival"] = _arrival(trajectory, summary)
+        cells["effort"] = float(np.trapezoid(np.sum(trajectory.u**2, axis=1), trajectory.t))
+    return cells | {f"u_max.{name}": value for name, value in summary.get("u_max", {}).items()}
 
 
 def failed(outcome: str, message: str) -> dict[str, Any]:
@@ -154,7 +156,7 @@ def rows_of(
     cells_of, changes = definition.parameters(indices), definition.changes(indices)
     rows: list[dict[str, Any]] = []
 
-    def found(k: int) -> dict[str, Any]:
+    def rollout(k: int) -> dict[str, Any]:
         return _rollout(definition, indices[k], changes[k], keep)
 
     def add(cells: dict[str, Any]) -> None:
@@ -168,11 +170,11 @@ def rows_of(
         # With several threads the first row compiles alone.
         first = len(indices) if threads == 1 else min(1, len(indices))
         for k in range(first):
-            add(found(k))
+            add(rollout(k))
         if first < len(indices):
             with ThreadPoolExecutor(min(threads, len(indices) - first)) as pool:
                 try:
-                    for cells in pool.map(found, range(first, len(indices))):
+                    for cells in pool.map(rollout, range(first, len(indices))):
                         add(cells)
                 except BaseException:
                     pool.shutdown(wait=False, cancel_futures=True)
@@ -215,12 +217,12 @@ def _controller_of(
     if not hasattr(_own, "controllers"):
         _own.controllers = OrderedDict()
     if key in _own.controllers:
-        return _kept(_own.controllers, key), True
+        return _cached(_own.controllers, key), True
     with _lock:
         controller = scenario.controller()
     if not wholly_compiled(controller):
         return controller, False
-    return _kept(_own.controllers, key, controller), True
+    return _cached(_own.controllers, key, controller), True
 
 
 def wholly_compiled(controller: Controller) -> bool:
@@ -234,20 +236,20 @@ def scenario_of(definition: Definition, changes: dict[str, Any]) -> Scenario:
     rest = {key: value for key, value in changes.items() if key not in of_robot}
     key = definition.digest, json.dumps(of_robot, default=str)
     if key in _robots:
-        return _kept(_robots, key).with_settings(rest)
+        return _cached(_robots, key).with_settings(rest)
     scenario = Scenario(definition.document).with_settings(of_robot)
     scenario.robot()
-    return _kept(_robots, key, scenario).with_settings(rest)
+    return _cached(_robots, key, scenario).with_settings(rest)
 
 
-def _kept(kept: OrderedDict[Key, Value], key: Key, new: Value | None = None) -> Value:
-    """What is kept under a key, or is new there; the least recently used is forgotten."""
+def _cached(cache: OrderedDict[Key, Value], key: Key, new: Value | None = None) -> Value:
+    """The entry of a key, or the new one, which is stored; the least recently used entry is dropped."""
     if new is not None:
-        kept[key] = new
-        if len(kept) > MOST_KEPT:
-            kept.popitem(last=False)
-    kept.move_to_end(key)
-    return kept[key]
+        cache[key] = new
+        if len(cache) > MOST_KEPT:
+            cache.popitem(last=False)
+    cache.move_to_end(key)
+    return cache[key]
 
 
 class Computed(NamedTuple):
@@ -271,5 +273,5 @@ def computed(chunk: int, progress: Progress | None, definition: Definition, thre
             saved = trajectory.save(Path(folder) / "run", figures=False, html=html)
             runs[index] = {path.name: path.read_bytes() for path in saved.iterdir()}
 
-    kept = keep if definition.keep else None
-    return Computed(rows_of(definition, definition.indices(chunk), kept, progress, threads), runs)
+    keeper = keep if definition.keep else None
+    return Computed(rows_of(definition, definition.indices(chunk), keeper, progress, threads), runs)

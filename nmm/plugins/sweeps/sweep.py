@@ -87,7 +87,7 @@ class Sweep:
         loaded = scenario if isinstance(scenario, Scenario) else Scenario.load(scenario)
         self.scenario = loaded.with_settings(settings) if settings else loaded
         self.scenario.controller()
-        varying = tuple(varied(key, given) for key, given in vary.items())
+        varying = tuple(varied(key, values) for key, values in vary.items())
         expect(varying, "vary", "at least one key to vary, such as q0.x=-1:1")
         sampler, points = _sampling(varying, sampler, samples)
         if keep is not None:
@@ -167,12 +167,12 @@ class Sweep:
             threads = self._threads(local, sum(map(len, map(definition.indices, missing))))
             job = partial(computed, definition=definition)
             if missing:
-                found = (
+                results = (
                     as_done(partial(job, threads=threads), missing, -(-local // threads), done.report)
                     if client is None
                     else as_done_by(client, job, missing)
                 )
-                for chunk, rows in stack.enter_context(closing(found)):
+                for chunk, rows in stack.enter_context(closing(results)):
                     place.add(chunk, rows)
                     done.report(chunk, 1.0)
             place.finish()
@@ -183,20 +183,20 @@ class Sweep:
     def _units(self) -> dict[str, str]:
         """Units of columns that the robot and its tasks tell."""
         robot = self.scenario.robot()
-        found = {f"q0.{name}": unit for name, unit in zip(robot.q_names, robot.q_units, strict=True)}
-        found |= {f"u_max.{name}": unit for name, unit in zip(robot.u_names, robot.u_units, strict=True)}
+        by_column = {f"q0.{name}": unit for name, unit in zip(robot.q_names, robot.q_units, strict=True)}
+        by_column |= {f"u_max.{name}": unit for name, unit in zip(robot.u_names, robot.u_units, strict=True)}
         units = {row.unit for task in self.scenario.controller().task for row in task.rows(robot)}
-        if len(units) == 1 and not any(one.key.startswith("task") for one in self.definition.vary):
+        if len(units) == 1 and not any(axis.key.startswith("task") for axis in self.definition.vary):
             unit = units.pop()
-            found |= {one.name: unit for one in MEASURED if one.name.startswith("error_")}
-        return found
+            by_column |= {column.name: unit for column in MEASURED if column.name.startswith("error_")}
+        return by_column
 
     def _threads(self, jobs: int, rows: int) -> int:
         """Rows that a process computes at the same time, of `jobs` in all, with `rows` left: several if they
         are too few for processes to pay, robots stay the same, and steps are compiled as a whole, which holds
         no GIL; limited by what Python does in between."""
         controller, varying = self.scenario.controller(), self.definition.vary
-        shared = not any(one.key.split(".")[0] == "robot" for one in varying)
+        shared = not any(axis.key.split(".")[0] == "robot" for axis in varying)
         if rows > FEW_ROWS * jobs or not shared or self.definition.keep or not wholly_compiled(controller):
             return 1
         return -(-jobs // -(-jobs // MOST_THREADS))
@@ -219,13 +219,13 @@ class _Done:
 
 
 def _sampling(vary: tuple[Varied, ...], sampler: str | None, samples: object) -> tuple[str, int]:
-    ranges = [one for one in vary if isinstance(one, Range)]
+    ranges = [axis for axis in vary if isinstance(axis, Range)]
     chosen = sampler or ("sobol" if ranges else GRID)
     expect_known("sampler", chosen, [GRID, *SAMPLERS], "sampler")
     if chosen == GRID and ranges:
-        one = ranges[0]
-        expected = f"{one.lower:g}:{one.upper:g}:COUNT, or another sampler ({listed(list(SAMPLERS), 'or')})"
-        raise InputError("a grid needs a count", where=f"vary {one.key}", expected=expected)
+        axis = ranges[0]
+        expected = f"{axis.lower:g}:{axis.upper:g}:COUNT, or another sampler ({listed(list(SAMPLERS), 'or')})"
+        raise InputError("a grid needs a count", where=f"vary {axis.key}", expected=expected)
     if chosen != GRID and not ranges:
         problem = f"{chosen} has nothing to sample, as every key has its values"
         raise InputError(problem, where="sampler", expected="a range LOWER:UPPER")
@@ -234,7 +234,7 @@ def _sampling(vary: tuple[Varied, ...], sampler: str | None, samples: object) ->
             problem = "a grid has as many rollouts as its values have combinations; leave it out"
             raise InputError(problem, where="samples")
         return chosen, 1
-    keys = ", ".join(one.key for one in ranges)
+    keys = ", ".join(axis.key for axis in ranges)
     expect(samples is not None, "samples", f"how many points of the ranges to take ({keys})")
     total = _whole(samples, "samples", 1)
     check_total(chosen, total)
@@ -279,10 +279,10 @@ def read_sweep(name_or_path: str | Path) -> dict[str, Any]:
         if not isinstance(data.get(key, {}), Mapping):
             where = document.where((key,))
             raise ScenarioError(where=where, expected="a mapping (key: value)", got=data[key])
-    found = {keyword: data[key] for key, keyword in KEYS.items() if key in data}
+    keywords = {keyword: data[key] for key, keyword in KEYS.items() if key in data}
     name = data["scenario"]
     if not isinstance(name, str):
         raise ScenarioError(where=document.where(("scenario",)), expected="a scenario's name", got=name)
     if name not in bundled_scenarios():
-        found["scenario"] = document.absolute(name, ("scenario",))
-    return {"name": path.name.split(".", 1)[0], **found}
+        keywords["scenario"] = document.absolute(name, ("scenario",))
+    return {"name": path.name.split(".", 1)[0], **keywords}

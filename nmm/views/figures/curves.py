@@ -45,7 +45,7 @@ def errors(trajectory: Trajectory, gain: float | None = None, *, width: float = 
     'log'
     """
     kinds = style.groups(trajectory.r_units)
-    names = [one.text for one in components(trajectory, QUANTITIES["error"])]
+    names = [component.text for component in components(trajectory, QUANTITIES["error"])]
     legends = [[names[row] for row in rows] for rows in kinds.values()]
     made, panels = style.stack([1.15] * len(kinds) + [1.5], [*legends, _NORM_AND_GUIDE], width)
     for axes, (unit, rows), texts in zip(panels, kinds.items(), legends, strict=False):
@@ -63,7 +63,7 @@ def draw_events(axes: Axes, trajectory: Trajectory, *, named: bool) -> None:
         if event.t > trajectory.t[0]:
             at.setdefault(event.t, []).append(f"{event.task} {event.what}")
     for t, texts in at.items():
-        dashes = "--" if any(one.endswith("begins") for one in texts) else ":"
+        dashes = "--" if any(text.endswith("begins") for text in texts) else ":"
         axes.axvline(t, color=style.GREY, linestyle=dashes, linewidth=1.0, zorder=1)
         if named:
             axes.annotate(

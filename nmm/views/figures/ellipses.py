@@ -77,11 +77,11 @@ class _Ellipses(Viewed):
         style.sampled([trajectory], "the ellipses")
         robot = trajectory.robot
         self.frame = drawn_frame(options, robot, trajectory.frame)
-        kept = np.unique(np.linspace(0, len(trajectory) - 1, min(len(trajectory), _POINTS)).astype(int))
-        q = trajectory.q[kept]
+        sampled = np.unique(np.linspace(0, len(trajectory) - 1, min(len(trajectory), _POINTS)).astype(int))
+        q = trajectory.q[sampled]
         along = drawn_ellipsoids(options, robot, self.frame, q)
         self.path = along[WHOLE].center
-        motion = Motion(robot, trajectory.t[kept], q, trajectory.u[kept], path=self.path)
+        motion = Motion(robot, trajectory.t[sampled], q, trajectory.u[sampled], path=self.path)
         silhouette = Silhouette(robot, self.frame)
         largest = largest_radius([along])
         # A way that is driven several times counts as a circle of its extent at most.
@@ -99,7 +99,8 @@ class _Ellipses(Viewed):
         side = upright(self.path)
         self.outlines = {
             view: {
-                part: found.projected(view.rows).outline(self.scale)[samples] for part, found in along.items()
+                part: ellipsoids.projected(view.rows).outline(self.scale)[samples]
+                for part, ellipsoids in along.items()
             }
             for view in (ABOVE, side)
         }

@@ -142,8 +142,8 @@ def _draw_inset(axes: Axes, runs: Sequence[Trajectory], first: float, last: floa
     inset = axes.inset_axes(_INSET)
     worn = resolver_style.looks_of_labels([run.called for run in runs])
     seen = [(run.t >= first - 1e-9) & (run.t <= last + 1e-9) for run in runs]
-    times = [run.t[there] for run, there in zip(runs, seen, strict=True)]
-    style.compared(inset, worn, times, [run.objective[there] for run, there in zip(runs, seen, strict=True)])
+    times = [run.t[mask] for run, mask in zip(runs, seen, strict=True)]
+    style.compared(inset, worn, times, [run.objective[mask] for run, mask in zip(runs, seen, strict=True)])
     style.dress(inset, size=style.SMALL - 1.0)
     inset.set_xlim(first, last)
     style.value_axis(inset)

@@ -94,8 +94,8 @@ class Viewed(ABC):
 
     def limits(self, view: View, width: float) -> list[tuple[float, float]]:
         """Limits of both axes that hold everything, with a margin that is the same on all sides, m."""
-        found = np.vstack([part[np.all(np.isfinite(part), axis=1)] for part in self.points(view, width)])
-        low, high = found.min(axis=0), found.max(axis=0)
+        points = np.vstack([part[np.all(np.isfinite(part), axis=1)] for part in self.points(view, width)])
+        low, high = points.min(axis=0), points.max(axis=0)
         if view != ABOVE and view.across == ABOVE.across and ABOVE in self.views:
             # One above the other: x is where it is.
             above = np.vstack(self.points(ABOVE, width))[:, 0]
@@ -193,10 +193,10 @@ class Paths(Viewed):
     def points(self, view: View, width: float) -> list[Array]:
         floors = self._floors if view == ABOVE else []
         parts = [self._held, self._desired, *self._seen.parts, *self._paths, *floors]
-        found = np.vstack([view.of(part) for part in parts if part is not None and len(part)])
-        low, high = np.nanmin(found, axis=0), np.nanmax(found, axis=0)
+        points = np.vstack([view.of(part) for part in parts if part is not None and len(part)])
+        low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
         middle, half = 0.5 * (low + high), max(0.05, _FLAT * float(np.max(high - low)))
-        return [found, np.array([middle - half, middle + half])]
+        return [points, np.array([middle - half, middle + half])]
 
     def draw(self, axes: Axes, view: View) -> None:
         self.dress(axes, view)

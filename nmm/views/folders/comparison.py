@@ -38,12 +38,12 @@ def folder_name(called: str) -> str:
 
 def names_of(trajectories: Sequence[Trajectory]) -> list[str]:
     """A unique folder name for each run."""
-    found: list[str] = []
+    names: list[str] = []
     for trajectory in trajectories:
         name = folder_name(trajectory.called)
         again = (f"{name}-{k}" for k in count(2))
-        found.append(name if name not in found else next(other for other in again if other not in found))
-    return found
+        names.append(name if name not in names else next(other for other in again if other not in names))
+    return names
 
 
 def save(

@@ -18,57 +18,57 @@ if TYPE_CHECKING:
 is_laps = FolderKind("nmm laps 1")
 
 
-def save(found: Repeatability, folder: str | Path, *, figures: FigureOptions = PLAIN) -> Path:
+def save(repeatability: Repeatability, folder: str | Path, *, figures: FigureOptions = PLAIN) -> Path:
     """Write each run's folder, summary.json, laps.csv and laps.png, replacing a folder of laps; InputError
     for one of anything else, or one that cannot be written."""
     with replaced_folder(folder, is_laps) as temporary:
-        for one in found.laps:
-            one.trajectory.save(temporary / one.name, figures=False)
-        is_laps.write(temporary, _summary(found), ensure_ascii=True)
+        for run in repeatability.laps:
+            run.trajectory.save(temporary / run.name, figures=False)
+        is_laps.write(temporary, _summary(repeatability), ensure_ascii=True)
         with (temporary / "laps.csv").open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file, lineterminator="\n").writerows(_lines(found))
-        if any(len(one.distance) for one in found.laps):
+            csv.writer(file, lineterminator="\n").writerows(_lines(repeatability))
+        if any(len(run.distance) for run in repeatability.laps):
             from nmm.views.figures.repeatability import laps
             from nmm.views.figures.style import save_as
 
-            save_as(laps(found, **figures.across()), temporary, "laps", figures)
+            save_as(laps(repeatability, **figures.across()), temporary, "laps", figures)
     return Path(folder)
 
 
-def _summary(found: Repeatability) -> dict[str, Any]:
+def _summary(repeatability: Repeatability) -> dict[str, Any]:
     return {
-        "complete": found.complete,
-        "period": found.period,
-        "transient": str(found.transient),
+        "complete": repeatability.complete,
+        "period": repeatability.period,
+        "transient": str(repeatability.transient),
         "laps": {
-            one.name: {
-                "verdict": str(one.verdict),
-                "finding": one.verdict.as_json(),
-                "closes": one.closes,
-                "converges": one.converges,
-                "factor": one.factor,
-                "distance": one.distance.tolist(),
-                "displacement": one.displacement.tolist(),
-                "errors": one.errors.tolist(),
+            run.name: {
+                "verdict": str(run.verdict),
+                "finding": run.verdict.as_json(),
+                "closes": run.closes,
+                "converges": run.converges,
+                "factor": run.factor,
+                "distance": run.distance.tolist(),
+                "displacement": run.displacement.tolist(),
+                "errors": run.errors.tolist(),
                 "turns": {
                     coordinate: turns.tolist()
-                    for coordinate, turns in zip(one.robot.q_names, one.turns.T, strict=True)
+                    for coordinate, turns in zip(run.robot.q_names, run.turns.T, strict=True)
                     if np.any(turns)
                 },
             }
-            for one in found.laps
+            for run in repeatability.laps
         },
     }
 
 
-def _lines(found: Repeatability) -> Iterator[list[object]]:
-    names = found.laps[0].robot.q_names if found.laps else ()
+def _lines(repeatability: Repeatability) -> Iterator[list[object]]:
+    names = repeatability.laps[0].robot.q_names if repeatability.laps else ()
     yield [
         "resolver", "lap", *names, *(f"drift_{name}" for name in names), "posture_drift", "displacement",
         "task_error",
     ]  # fmt: skip
-    for one in found.laps:
-        changes = np.column_stack([one.drift, one.distance, one.displacement]).tolist()
-        ends = zip(one.q.tolist(), [[""] * (len(names) + 2), *changes], one.errors.tolist(), strict=False)
+    for run in repeatability.laps:
+        changes = np.column_stack([run.drift, run.distance, run.displacement]).tolist()
+        ends = zip(run.q.tolist(), [[""] * (len(names) + 2), *changes], run.errors.tolist(), strict=False)
         for k, (q, change, error) in enumerate(ends):  # none where the first lap could not begin
-            yield [one.name, k, *q, *change, error]
+            yield [run.name, k, *q, *change, error]

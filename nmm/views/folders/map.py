@@ -75,24 +75,24 @@ def _arrays(made: Map) -> dict[str, Array | Integers]:
     """The arrays of map.npz; a row of NaN is after each line."""
     gap = np.full((1, 2), np.nan)
     first: dict[str, Any] = {f"axis_{i}": axis for i, axis in enumerate(made.axes)}
-    found = {**first, "rank": made.rank, "q": made.q, "q_names": np.array(made.about.q_names), **made.values}
+    arrays = {**first, "rank": made.rank, "q": made.q, "q_names": np.array(made.about.q_names), **made.values}
     for prefix, layer in (("worst", made.worst), ("best_q", made.best_q), ("worst_q", made.worst_q)):
-        found |= {f"{prefix}_{name}": values for name, values in layer.items()}
-    for prefix, those in (("singular", made.singular), ("arm_singular", made.arm_singular)):
-        if those is not None:
-            found[f"{prefix}_points"] = those.points
-            found[f"{prefix}_lines"] = np.vstack(
-                [piece for line in those.lines for piece in (line, gap)] or [np.zeros((0, 2))]
+        arrays |= {f"{prefix}_{name}": values for name, values in layer.items()}
+    for prefix, singular in (("singular", made.singular), ("arm_singular", made.arm_singular)):
+        if singular is not None:
+            arrays[f"{prefix}_points"] = singular.points
+            arrays[f"{prefix}_lines"] = np.vstack(
+                [piece for line in singular.lines for piece in (line, gap)] or [np.zeros((0, 2))]
             )
-    return found
+    return arrays
 
 
-def _found(those: SingularSet) -> dict[str, Any]:
+def _found(singular: SingularSet) -> dict[str, Any]:
     # Pieces of lines that cross, and both ends of a turn, make no count of lines.
-    return {"lines": bool(those.lines), "points": len(those.points), "everywhere": those.everywhere}
+    return {"lines": bool(singular.lines), "points": len(singular.points), "everywhere": singular.everywhere}
 
 
-def _ends(found: Mapping[str, Extreme]) -> dict[str, Any]:
+def _ends(extremes: Mapping[str, Extreme]) -> dict[str, Any]:
     """Extremes in plain data; "on" says whether a cell or a singular set between cells has the value."""
     return {
         end: {
@@ -100,5 +100,5 @@ def _ends(found: Mapping[str, Extreme]) -> dict[str, Any]:
             "at": None if on == EVERYWHERE else finite(at),
             "on": on or "cell",
         }
-        for end, (value, at, on) in found.items()
+        for end, (value, at, on) in extremes.items()
     }

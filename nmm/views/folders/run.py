@@ -107,86 +107,86 @@ def _loaded(folder: Path, robot: Robot | None) -> Trajectory:
         expected = "a run's folder (with trajectory.npz and nmm's summary.json)"
         kind = folder_kind(folder)
         raise InputError(where=folder, expected=expected, **({"got": f"that of a {kind}"} if kind else {}))
-    told = read_checked(summary, ToldRun, FORMAT)
-    found = read_arrays(file)
-    check_arrays(found, file, len(told.limit_names), len(told.clearance_names))
-    _check_counts(told, found, summary)
-    sizes = dict(zip("Nnms", (*found["q"].shape, found["u"].shape[1], found["r"].shape[1]), strict=True))
-    absent = {one.name: None if one.optional else one.absent(**sizes) for one in saved()}
-    arrays = {name: found.get(name, fill) for name, fill in absent.items()}
-    obstacles = _obstacles(told.obstacles or (), found, file)
+    stored = read_checked(summary, ToldRun, FORMAT)
+    npz = read_arrays(file)
+    check_arrays(npz, file, len(stored.limit_names), len(stored.clearance_names))
+    _check_counts(stored, npz, summary)
+    sizes = dict(zip("Nnms", (*npz["q"].shape, npz["u"].shape[1], npz["r"].shape[1]), strict=True))
+    absent = {quantity.name: None if quantity.optional else quantity.absent(**sizes) for quantity in saved()}
+    arrays = {name: npz.get(name, fill) for name, fill in absent.items()}
+    obstacles = _obstacles(stored.obstacles or (), npz, file)
     scenario, rest = None, dict[str, Any]()
     if (folder / "scenario.yaml").exists():
         loaded = Scenario.load(folder / "scenario.yaml")
         scenario = loaded.resolved()
         robot = loaded.robot() if robot is None else robot
         rest["surroundings"] = loaded.surroundings(robot)
-        if told.obstacles is None:
+        if stored.obstacles is None:
             obstacles = loaded.obstacles(robot)
     elif robot is None:
         try:
-            robot = load_robot(told.robot.source, arguments=told.robot.arguments)
+            robot = load_robot(stored.robot.source, arguments=stored.robot.arguments)
         except RobotError as error:
             raise InputError(f"its robot cannot be loaded ({_ASK}): {error}", where=folder) from None
-    same = told.robot.fingerprint in (None, robot.fingerprint)
-    if not same or (found["q"].shape[1], found["u"].shape[1]) != (robot.n, robot.n_u):
+    same = stored.robot.fingerprint in (None, robot.fingerprint)
+    if not same or (npz["q"].shape[1], npz["u"].shape[1]) != (robot.n, robot.n_u):
         raise InputError(f"{robot.name} is another robot than the run's ({_ASK})", where=folder)
-    named = [] if told.frame is None else [("frame", told.frame)]
-    named += [(f"cameras.{i}.frame", one.frame) for i, one in enumerate(told.cameras)]
+    named = [] if stored.frame is None else [("frame", stored.frame)]
+    named += [(f"cameras.{i}.frame", camera.frame) for i, camera in enumerate(stored.cameras)]
     for key, frame in named:
         try:
             robot.frame_id(frame)
         except InputError as error:
             raise error.at(f"{summary}: {key}") from None
-    findings = None if told.findings is None else [one.model_dump() for one in told.findings]
+    findings = None if stored.findings is None else [finding.model_dump() for finding in stored.findings]
     own = ToldRun.model_fields.keys() & Trajectory.__dataclass_fields__.keys()
-    rest |= {name: getattr(told, name) for name in own} | {
+    rest |= {name: getattr(stored, name) for name in own} | {
         "robot": robot,
-        "verdict": verdict_of(told.outcome, told.message, told.warnings, findings),
-        "unmet": Residuals(*(getattr(told, f"unmet_{name}") for name in Residuals._fields)),
-        "kinematics_off": float("nan") if told.kinematics_off is None else told.kinematics_off,
+        "verdict": verdict_of(stored.outcome, stored.message, stored.warnings, findings),
+        "unmet": Residuals(*(getattr(stored, f"unmet_{name}") for name in Residuals._fields)),
+        "kinematics_off": float("nan") if stored.kinematics_off is None else stored.kinematics_off,
         "obstacles": obstacles,
         "scenario": scenario,
-        "events": tuple(Event(**event.model_dump()) for event in told.events),
-        "cameras": _cameras(told, arrays, summary),
+        "events": tuple(Event(**event.model_dump()) for event in stored.events),
+        "cameras": _cameras(stored, arrays, summary),
     }
     return Trajectory.of(arrays, **rest)
 
 
-def _cameras(told: ToldRun, arrays: Mapping[str, Any], summary: Path) -> tuple[RunCamera, ...]:
+def _cameras(stored: ToldRun, arrays: Mapping[str, Any], summary: Path) -> tuple[RunCamera, ...]:
     """The cameras of a summary; InputError for points that were not seen, or rows that the task lacks."""
     from nmm.motion.seen import GoalRows, RunCamera
 
-    seen, rows = arrays["seen"], range(len(told.r_names))
+    seen, rows = arrays["seen"], range(len(stored.r_names))
     points = range(0 if seen is None else seen.shape[1])
-    for i, one in enumerate(told.cameras):
-        own = range(len(one.points))
-        numbers = [*(goal.point for goal in one.goals), *(end for line in one.lines for end in line)]
-        fits = all(point in points for point in one.points) and all(number in own for number in numbers)
+    for i, camera in enumerate(stored.cameras):
+        own = range(len(camera.points))
+        numbers = [*(goal.point for goal in camera.goals), *(end for line in camera.lines for end in line)]
+        fits = all(point in points for point in camera.points) and all(number in own for number in numbers)
         expect(fits, f"{summary}: cameras.{i}", f"numbers of the {len(points)} points in trajectory.npz")
-        fits = all(goal.x in rows and goal.y in rows for goal in one.goals)
+        fits = all(goal.x in rows and goal.y in rows for goal in camera.goals)
         expect(fits, f"{summary}: cameras.{i}.goals", f"rows from 0 to {len(rows) - 1}")
     return tuple(
-        RunCamera(**{**dict(one), "goals": tuple(GoalRows(**dict(goal)) for goal in one.goals)})
-        for one in told.cameras
+        RunCamera(**{**dict(camera), "goals": tuple(GoalRows(**dict(goal)) for goal in camera.goals)})
+        for camera in stored.cameras
     )
 
 
-def _check_counts(told: ToldRun, found: Mapping[str, Any], summary: Path) -> None:
+def _check_counts(stored: ToldRun, arrays: Mapping[str, Any], summary: Path) -> None:
     """InputError if summary.json and the arrays differ in the number of samples or rows."""
-    count, rows = found["r"].shape
-    fits = told.samples in (None, count)
-    expect(fits, f"{summary}: samples", f"{count}, as in trajectory.npz", told.samples)
-    for key, names in (("r_names", told.r_names), ("r_units", told.r_units)):
+    count, rows = arrays["r"].shape
+    fits = stored.samples in (None, count)
+    expect(fits, f"{summary}: samples", f"{count}, as in trajectory.npz", stored.samples)
+    for key, names in (("r_names", stored.r_names), ("r_units", stored.r_units)):
         expect(len(names) == rows, f"{summary}: {key}", f"{rows}, as in trajectory.npz", len(names))
 
 
 def _arrays(trajectory: Trajectory) -> dict[str, Any]:
-    arrays: dict[str, Any] = {one.name: trajectory[one.name] for one in saved()}
+    arrays: dict[str, Any] = {quantity.name: trajectory[quantity.name] for quantity in saved()}
     arrays = {name: values for name, values in arrays.items() if values is not None}
-    for i, one in enumerate(trajectory.obstacles):
-        arrays[f"obstacle_{i}_places"] = obstacle_places(one, trajectory.t)
-        arrays[f"obstacle_{i}_points"] = obstacle_as_json(one.shape)[1]
+    for i, obstacle in enumerate(trajectory.obstacles):
+        arrays[f"obstacle_{i}_places"] = obstacle_places(obstacle, trajectory.t)
+        arrays[f"obstacle_{i}_points"] = obstacle_as_json(obstacle.shape)[1]
     robot = trajectory.robot
     for key, names in {"q": robot.q_names, "u": robot.u_names, "r": trajectory.r_names}.items():
         arrays[f"{key}_names"] = np.array(names)
@@ -195,29 +195,34 @@ def _arrays(trajectory: Trajectory) -> dict[str, Any]:
     return arrays
 
 
-def _obstacles(listed: Sequence[ToldObstacle], found: Mapping[str, Any], file: Path) -> tuple[Obstacle, ...]:
+def _obstacles(listed: Sequence[ToldObstacle], arrays: Mapping[str, Any], file: Path) -> tuple[Obstacle, ...]:
     """The obstacles of a summary, at the placements in the arrays."""
     from nmm.views.folders.schema import check_placements
 
     obstacles = []
-    for i, one in enumerate(listed):
+    for i, obstacle in enumerate(listed):
         names = f"obstacle_{i}_places", f"obstacle_{i}_points"
         for name in names:
-            if name not in found:
+            if name not in arrays:
                 raise InputError("this array is missing", where=f"{file}: {name}")
-        passed, points = (found[name] for name in names)
-        check_placements(passed, f"{file}: {names[0]}", (1, len(found["t"])))
+        passed, points = (arrays[name] for name in names)
+        check_placements(passed, f"{file}: {names[0]}", (1, len(arrays["t"])))
         try:
-            shape = shape_from_json(one.shape, points)
+            shape = shape_from_json(obstacle.shape, points)
         except (InputError, TypeError) as error:
             wrong = error if isinstance(error, InputError) else InputError(str(error))
             raise wrong.at(f"{file.with_name('summary.json')}: obstacles.{i}.shape") from None
-        obstacles.append(obstacle_from_json(shape, one.name, found["t"], passed))
+        obstacles.append(obstacle_from_json(shape, obstacle.name, arrays["t"], passed))
     return tuple(obstacles)
 
 
 def _write_csv(trajectory: Trajectory, path: Path) -> None:
-    columns = [(name, x) for one in placed() if one.column for name, _, _, x in components(trajectory, one)]
+    columns = [
+        (name, x)
+        for quantity in placed()
+        if quantity.column
+        for name, _, _, x in components(trajectory, quantity)
+    ]
     with path.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerow([name for name, _ in columns])
         # Numbers need no quotes: joined by hand they are written in two thirds of the writer's time. All of a
@@ -225,5 +230,5 @@ def _write_csv(trajectory: Trajectory, path: Path) -> None:
         for first in range(0, len(trajectory), ROWS):
             some = [values[first : first + ROWS].tolist() for _, values in columns]
             file.writelines(
-                f"{','.join(line)}\n" for line in zip(*(map(repr, one) for one in some), strict=True)
+                f"{','.join(line)}\n" for line in zip(*(map(repr, column) for column in some), strict=True)
             )

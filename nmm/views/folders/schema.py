@@ -125,11 +125,11 @@ def read_checked(path: Path, kind: type[Kind], format_: str) -> Kind:
     """A JSON file's content; InputError names the file, the key and what was expected."""
     with _reading(path):
         content = read_bytes(path, MOST)
-    said = _checked(path, content, ToldFormat).format
-    if said != format_:
-        same = said.rpartition(" ")[0] == format_.rpartition(" ")[0]
+    stored = _checked(path, content, ToldFormat).format
+    if stored != format_:
+        same = stored.rpartition(" ")[0] == format_.rpartition(" ")[0]
         what = "written by another version of nmm" if same else ""
-        raise InputError(what, where=f"{path}: format", expected=repr(format_), got=said)
+        raise InputError(what, where=f"{path}: format", expected=repr(format_), got=stored)
     return _checked(path, content, kind)
 
 
@@ -146,7 +146,7 @@ def _checked(path: Path, content: bytes, kind: type[Kind]) -> Kind:
 
 def read_arrays(path: Path) -> dict[str, Any]:
     """All arrays of an npz file; InputError names the file and a damaged array."""
-    name, found = "", {}
+    name, arrays = "", {}
     with _reading(path):
         expect_file(path)
         try:
@@ -157,7 +157,7 @@ def read_arrays(path: Path) -> dict[str, Any]:
                 raise InputError(holds, where=path)
             with np.load(path, allow_pickle=False) as file:
                 for name in file.files:
-                    found[name] = file[name]
+                    arrays[name] = file[name]
         except (InputError, OSError):
             raise
         except Exception as error:  # zipfile, zlib and numpy raise whatever they meet in a damaged file
@@ -165,7 +165,7 @@ def read_arrays(path: Path) -> dict[str, Any]:
             reason = one_line(str(error)) or type(error).__name__
             damaged = f"{printable(entry)}damaged, or not what nmm wrote: {printable(reason)}"
             raise InputError(damaged, where=path) from None
-    return found
+    return arrays
 
 
 @contextmanager
@@ -178,36 +178,36 @@ def _reading(path: Path) -> Iterator[None]:
         raise InputError(f"cannot be read: {error.strerror or error}", where=path) from None
 
 
-def check_arrays(found: dict[str, Any], path: Path, limits: int, pairs: int) -> None:
+def check_arrays(arrays: dict[str, Any], path: Path, limits: int, pairs: int) -> None:
     """InputError for a run's array that is missing, or of another kind or shape than summary.json implies."""
-    lengths = {"L": limits, "K": np.size(found.get("t", ())) if pairs else 0}
-    for one in saved():
-        name = one.name
-        if name not in found:
-            if (one.since == 1 and not one.optional) or (pairs and one.shape.startswith("K")):
+    lengths = {"L": limits, "K": np.size(arrays.get("t", ())) if pairs else 0}
+    for quantity in saved():
+        name = quantity.name
+        if name not in arrays:
+            if (quantity.since == 1 and not quantity.optional) or (pairs and quantity.shape.startswith("K")):
                 raise InputError("this array is missing", where=f"{path}: {name}")
             continue
-        array, where = found[name], f"{path}: {name}"
-        fits = array.dtype.kind == ("i" if one.whole else "f") and array.dtype.itemsize == 8
-        expect(fits, where, f"{'whole ' if one.whole else ''}numbers of 64 bits", str(array.dtype))
-        expect(array.ndim == len(one.shape), where, f"{len(one.shape)} axes", array)
+        array, where = arrays[name], f"{path}: {name}"
+        fits = array.dtype.kind == ("i" if quantity.whole else "f") and array.dtype.itemsize == 8
+        expect(fits, where, f"{'whole ' if quantity.whole else ''}numbers of 64 bits", str(array.dtype))
+        expect(array.ndim == len(quantity.shape), where, f"{len(quantity.shape)} axes", array)
         expected = [
             int(letter) if letter.isdigit() else lengths.setdefault(letter, length)
-            for letter, length in zip(one.shape, array.shape, strict=True)
+            for letter, length in zip(quantity.shape, array.shape, strict=True)
         ]
         expect(expected == list(array.shape), where, f"shape {tuple(expected)}", array)
-        finite = not one.finite or np.all(np.abs(array) <= LARGEST)
+        finite = not quantity.finite or np.all(np.abs(array) <= LARGEST)
         expect(finite, where, f"finite numbers, none beyond {LARGEST:g}")
-        beyond = one.bounded and np.any(np.abs(array[np.isfinite(array)]) > LARGEST)
+        beyond = quantity.bounded and np.any(np.abs(array[np.isfinite(array)]) > LARGEST)
         expect(not beyond, where, f"numbers, none beyond {LARGEST:g}")
-    increasing(found["t"], f"{path}: t")
-    counts = {"m": found["u"].shape[1], "p": pairs}
-    for one in saved():
-        if one.counts is not None and one.name in found:
-            letter, words = one.counts
-            indices, count = found[one.name], counts[letter]
+    increasing(arrays["t"], f"{path}: t")
+    counts = {"m": arrays["u"].shape[1], "p": pairs}
+    for quantity in saved():
+        if quantity.counts is not None and quantity.name in arrays:
+            letter, words = quantity.counts
+            indices, count = arrays[quantity.name], counts[letter]
             fits = np.all((indices >= -1) & (indices < count))
-            expect(fits, f"{path}: {one.name}: {words}", f"numbers from -1 to {count - 1}", indices)
+            expect(fits, f"{path}: {quantity.name}: {words}", f"numbers from -1 to {count - 1}", indices)
 
 
 def check_placements(places: Any, where: str, lengths: Collection[int]) -> None:

@@ -48,8 +48,8 @@ class FolderKind:
 
     def write(self, folder: Path, content: Mapping[str, Any], *, ensure_ascii: bool = False) -> None:
         """Write the JSON file: the format, what made it unless `content` says so, and the content."""
-        told = {"format": self.format, "made_with": made_with(), **content}
-        text = json.dumps(told, indent=2, ensure_ascii=ensure_ascii)
+        document = {"format": self.format, "made_with": made_with(), **content}
+        text = json.dumps(document, indent=2, ensure_ascii=ensure_ascii)
         (folder / self.file).write_text(text + "\n", encoding="utf-8")
 
 
@@ -119,13 +119,13 @@ def steady(folder: Path, read: Callable[[], Read]) -> Read:
     for _ in range(MOST_READINGS):
         before = _identity(folder)
         try:
-            found = read()
+            content = read()
         except (InputError, OSError):
             if _identity(folder) == before:
                 raise
             continue
         if _identity(folder) == before:
-            return found
+            return content
     raise InputError("is being replaced again and again; read it when that has ended", where=folder)
 
 
@@ -160,7 +160,7 @@ def check_folder(folder: Path, is_ours: Callable[[Path], bool]) -> None:
 def _identity(folder: Path) -> tuple[int, int] | None:
     """A folder's identity and change time, if it exists."""
     try:
-        found = folder.stat()
+        status = folder.stat()
     except OSError:
         return None
-    return found.st_ino, found.st_mtime_ns
+    return status.st_ino, status.st_mtime_ns

@@ -19,11 +19,11 @@ DEPTH = 0.13
 
 def seen_points(motions: Sequence[Motion]) -> Array:
     """Points (K, 3), m, that cameras see, for the view to hold."""
-    found = [np.zeros((0, 3))]
+    points = [np.zeros((0, 3))]
     for camera in (camera for motion in motions for camera in motion.cameras):
         every = camera.points[:: max(1, len(camera.points) // 100)]
-        found.append(every.reshape(-1, 3))
-    return np.vstack(found)
+        points.append(every.reshape(-1, 3))
+    return np.vstack(points)
 
 
 def draw_cameras(
@@ -32,17 +32,17 @@ def draw_cameras(
     """Draw a motion's cameras and what they see; returns the animations of points that move. `path` is the
     motion's node, `size` half the diagonal of what is shown, m."""
     animations: list[Command] = []
-    kept = samples_kept(motion.t, fps)
+    samples = samples_kept(motion.t, fps)
     for i, camera in enumerate(motion.cameras):
-        points = camera.points[kept]
+        points = camera.points[samples]
         nodes = draw_camera(drawing, camera, robot, path, i, size)
         for node, places in zip(nodes, points.swapaxes(0, 1), strict=True):
-            times, distinct = page_times(motion.t[kept] - start)
+            times, distinct = page_times(motion.t[samples] - start)
             animations += animation(node, times, {"position": places[distinct]})
         drawing.commands[-1] |= {
-            "times": packed(motion.t[kept] - start, np.float64),
-            "pictures": packed(camera.picture(motion.robot, motion.q)[kept], np.float32),
-            "goals": packed(camera.goals[kept], np.float32),
+            "times": packed(motion.t[samples] - start, np.float64),
+            "pictures": packed(camera.picture(motion.robot, motion.q)[samples], np.float32),
+            "goals": packed(camera.goals[samples], np.float32),
         }
     return animations
 
@@ -84,10 +84,10 @@ def tell_cameras(drawing: Drawing, cameras: Sequence[Camera]) -> None:
 def live_numbers(cameras: Sequence[Camera], robot: Robot, q: Array) -> Array:
     """What live pages get of cameras from q (N, n), for each of them where its k points are, where it sees
     them and where they are to be, (N, 3 k + 2 k + 2 k)."""
-    found = [np.zeros((len(q), 0))]
-    for one in cameras:
-        found += [x.reshape(len(q), -1) for x in (one.points, one.picture(robot, q), one.goals)]
-    return np.hstack(found)
+    numbers = [np.zeros((len(q), 0))]
+    for camera in cameras:
+        numbers += [x.reshape(len(q), -1) for x in (camera.points, camera.picture(robot, q), camera.goals)]
+    return np.hstack(numbers)
 
 
 def placed(points: Array) -> Iterator[Array]:

@@ -66,21 +66,21 @@ class Channels:
 
 
 def channels(run: Trajectory | Motion) -> Channels:
-    found = list(_of_motion(run))
+    plotted = list(_of_motion(run))
     events: list[Integers] = []
     partitions: tuple[str, ...] = ()
     if isinstance(run, Trajectory):
-        found = [*_of_task(run), *found, *_of_motors(run)]
+        plotted = [*_of_task(run), *plotted, *_of_motors(run)]
         if np.any(run.partition >= 0):
             number, partitions, switches = _partition(run)
-            found.append(Channel("partition", "partition", "", "partition", number))
+            plotted.append(Channel("partition", "partition", "", "partition", number))
             events += [switches, switches - 1]
         times = [event.t for event in run.events]
         events.append(np.searchsorted(run.t, times).clip(0, len(run.t) - 1))
-    values = [np.where(np.isfinite(one.values), one.values, np.nan) for one in found]
-    kept = _kept(run.t, values, events)
-    thinned = (replace(one, values=x[kept]) for one, x in zip(found, values, strict=True))
-    return Channels(run.t[kept], len(run.t), tuple(thinned), partitions)
+    values = [np.where(np.isfinite(channel.values), channel.values, np.nan) for channel in plotted]
+    samples = _kept(run.t, values, events)
+    thinned = (replace(channel, values=x[samples]) for channel, x in zip(plotted, values, strict=True))
+    return Channels(run.t[samples], len(run.t), tuple(thinned), partitions)
 
 
 def live_channels(
@@ -89,17 +89,21 @@ def live_channels(
     """The quantities that pages plot of a live robot, all but the hidden ones, and their channels, without
     values; if `partitioned`, a channel for RG's partition follows those of the quantities."""
     none, robot = np.zeros(0), axes.robot
-    shown = [(one, curve) for one, curve in curves() if one.name not in hidden and (one.noted or one.of)]
-    found = [
+    shown = [
+        (quantity, curve)
+        for quantity, curve in curves()
+        if quantity.name not in hidden and (quantity.noted or quantity.of)
+    ]
+    plotted = [
         Channel(column, text, unit, curve.panel, none, log=curve.log == "always")
-        for one, curve in shown
-        for column, text, unit in axes.labels(one)
+        for quantity, curve in shown
+        for column, text, unit in axes.labels(quantity)
     ]
     if partitioned:
-        found.append(Channel("partition", "partition", "", "partition", none))
+        plotted.append(Channel("partition", "partition", "", "partition", none))
     still = Motion(robot, np.zeros(1), robot.rest[np.newaxis], np.zeros((1, robot.n_u)))
-    found += [replace(one, values=none) for one in _of_motion(still)]
-    return [one for one, _ in shown], tuple(found)
+    plotted += [replace(channel, values=none) for channel in _of_motion(still)]
+    return [quantity for quantity, _ in shown], tuple(plotted)
 
 
 def _of_motion(run: Trajectory | Motion) -> Iterator[Channel]:
@@ -117,39 +121,41 @@ def _of_motion(run: Trajectory | Motion) -> Iterator[Channel]:
 
 def _of_motors(run: Trajectory) -> Iterator[Channel]:
     """Torques of the motors whose limits are known."""
-    if (found := motor_torques(run)) is None:
+    if (motors := motor_torques(run)) is None:
         return
-    units = found.dynamics.actuators.units
-    for name, unit, effort, values in zip(found.names, units, found.efforts, found.torques.T, strict=True):
+    units = motors.dynamics.actuators.units
+    for name, unit, effort, values in zip(motors.names, units, motors.efforts, motors.torques.T, strict=True):
         if np.isfinite(effort):
             ends = (-float(effort), float(effort))
             yield Channel(f"torque {name}", pretty(name), unit, TORQUES.panel, values, ends)
 
 
 def _of_task(run: Trajectory) -> Iterator[Channel]:
-    for one, curve in curves():
-        if not _drawn(run, one, curve):
+    for quantity, curve in curves():
+        if not _drawn(run, quantity, curve):
             continue
         lower = getattr(run, curve.lower) if isinstance(curve.lower, str) else curve.lower
-        for column, text, unit, values in components(run, one):
+        for column, text, unit, values in components(run, quantity):
             x = np.where(np.abs(values) < curve.exact, 0.0, values)
             log = curve.log == "always" or (curve.log == "positive" and not np.any(x < 0.0))
             yield Channel(column, text, unit, curve.panel, x, (lower, np.inf), log)
 
 
 def curves() -> list[tuple[RecordedQuantity, Curve]]:
-    those = [(one, one.curve) for one in placed() if one.name not in ("q", "u", "partition")]
-    return [(one, curve) for one, curve in those if curve is not None]
+    pairs = [
+        (quantity, quantity.curve) for quantity in placed() if quantity.name not in ("q", "u", "partition")
+    ]
+    return [(quantity, curve) for quantity, curve in pairs if curve is not None]
 
 
-def _drawn(run: Trajectory, one: RecordedQuantity, curve: Curve) -> bool:
+def _drawn(run: Trajectory, quantity: RecordedQuantity, curve: Curve) -> bool:
     if curve.if_true:
         return bool(getattr(run, curve.if_true))
-    values = run[one.name]
+    values = run[quantity.name]
     return (
         values is not None
         and len(values) == len(run)
-        and (np.isnan(one.fill) or bool(np.any(values != one.fill)))
+        and (np.isnan(quantity.fill) or bool(np.any(values != quantity.fill)))
     )
 
 
@@ -159,7 +165,7 @@ def _limits_kept(run: Trajectory) -> dict[str, tuple[float, float]]:
     robot = run.robot
     values = {f"u_{name}": run.u[:, i] for i, name in enumerate(robot.u_names)}
     values |= {name: run.q[:, i] for i, name in enumerate(robot.q_names)}
-    found: dict[str, tuple[float, float]] = {}
+    limits: dict[str, tuple[float, float]] = {}
     limited = zip(run.limit_names, run.shares.T, strict=True) if len(run.shares) == len(run) else ()
     for name, share in limited:
         if name not in values or not np.ptp(share) > STILL:
@@ -169,8 +175,8 @@ def _limits_kept(run: Trajectory) -> dict[str, tuple[float, float]]:
         lower = float(x[low]) - float(share[low]) * width
         # A share has no more digits than that.
         if width > 0.0 and np.allclose(lower + share * width, x, rtol=0.0, atol=1e-7 * width):
-            found[name] = round(lower, 9), round(lower + width, 9)
-    return found
+            limits[name] = round(lower, 9), round(lower + width, 9)
+    return limits
 
 
 def _partition(run: Trajectory) -> tuple[Array, tuple[str, ...], Integers]:
@@ -179,7 +185,7 @@ def _partition(run: Trajectory) -> tuple[Array, tuple[str, ...], Integers]:
     switches = np.flatnonzero(np.any(np.diff(columns, axis=0) != 0, axis=1)) + 1
     begins = np.concatenate([[0], switches])
     sets, number = np.unique(columns[begins], axis=0, return_inverse=True)
-    texts = tuple(partition_text(run.robot, one) for one in sets)
+    texts = tuple(partition_text(run.robot, basic) for basic in sets)
     lasts = np.diff(np.append(begins, len(columns)))
     return np.repeat(number.reshape(-1).astype(np.float64), lasts), texts, switches
 
@@ -197,12 +203,12 @@ def input_text(robot: Robot, column: int) -> str:
 def _kept(t: Array, curves: Sequence[Array], events: Sequence[Integers]) -> Integers:
     """The samples that a page holds, ascending: about `FPS` a second, both ends, events, each curve's
     extremes and ends of gaps; between those, the worst one where a curve would be visibly off."""
-    kept = samples_kept(t, FPS).astype(np.int64)
-    if len(kept) == len(t):
-        return kept
-    must = [kept, *events]
-    worst = np.zeros(len(kept) - 1)
-    where = np.zeros(len(kept) - 1, dtype=np.int64)
+    samples = samples_kept(t, FPS).astype(np.int64)
+    if len(samples) == len(t):
+        return samples
+    must = [samples, *events]
+    worst = np.zeros(len(samples) - 1)
+    where = np.zeros(len(samples) - 1, dtype=np.int64)
     for values in curves:
         known = np.isfinite(values)
         if not known.any():
@@ -210,11 +216,11 @@ def _kept(t: Array, curves: Sequence[Array], events: Sequence[Integers]) -> Inte
         edges = np.flatnonzero(known[1:] != known[:-1])  # where the curve begins or ends to be known
         must += [np.array([np.nanargmin(values), np.nanargmax(values)]), edges, edges + 1]
         size = max(float(np.nanmax(values) - np.nanmin(values)), ROUNDING)
-        off = np.nan_to_num(np.abs(values - np.interp(t, t[kept], values[kept])) / size)
-        most = np.maximum.reduceat(off, kept[:-1])
+        off = np.nan_to_num(np.abs(values - np.interp(t, t[samples], values[samples])) / size)
+        most = np.maximum.reduceat(off, samples[:-1])
         better = most > worst
         for k in np.flatnonzero(better & (most > SEEN)):
-            where[k] = kept[k] + int(np.argmax(off[kept[k] : kept[k + 1]]))
+            where[k] = samples[k] + int(np.argmax(off[samples[k] : samples[k + 1]]))
         worst = np.where(better, most, worst)
     missed = np.flatnonzero(worst > SEEN)
     missed = missed[np.argsort(-worst[missed])][:MOST_FRAMES]
@@ -224,36 +230,44 @@ def _kept(t: Array, curves: Sequence[Array], events: Sequence[Integers]) -> Inte
 def draw_curves(drawing: Drawing, runs: Sequence[Channels], looks: Sequence[Look], start: float) -> None:
     """Append the command "curves": each run's channels in its look; `start` is the page's first time, s."""
     lanes: dict[str, dict[str, Any]] = {}
-    found = []
+    data = []
     for run, look in zip(runs, looks, strict=True):
         columns = {}
-        for one in run.channels:
-            known = lanes.get(one.name)
-            same = known is None or (known["unit"], known["panel"]) == (one.unit, one.panel)
+        for channel in run.channels:
+            known = lanes.get(channel.name)
+            same = known is None or (known["unit"], known["panel"]) == (channel.unit, channel.panel)
             # With its unit, if another robot's channel of that name has a different one.
-            key = one.name if same else f"{one.name} [{one.unit}]"
-            lane = {"key": key, "panel": one.panel, "text": one.text, "unit": one.unit, "log": one.log}
+            key = channel.name if same else f"{channel.name} [{channel.unit}]"
+            lane = {
+                "key": key,
+                "panel": channel.panel,
+                "text": channel.text,
+                "unit": channel.unit,
+                "log": channel.log,
+            }
             lanes.setdefault(key, lane)
-            ends = [float(end) if np.isfinite(end) else None for end in one.limits]
-            columns[key] = {"values": packed(one.values, np.float32), "limits": ends}
+            ends = [float(end) if np.isfinite(end) else None for end in channel.limits]
+            columns[key] = {"values": packed(channel.values, np.float32), "limits": ends}
         dash = LENGTHS[look.dashes] if len(runs) > 1 else []
         own = {"samples": run.samples, "partitions": list(run.partitions), "columns": columns}
         worn = {"name": look.name, "color": look.color, "dash": dash}
-        found.append({"t": packed(run.t - start, np.float64), **own, **worn})
+        data.append({"t": packed(run.t - start, np.float64), **own, **worn})
     used = {lane["panel"] for lane in lanes.values()}
     panels = [
-        {"id": one.panel, "title": one.title, "open": _opens(one, runs)}
-        for one in sorted(filter(None, [*(one.curve for one in placed()), TORQUES]), key=lambda x: x.place)
-        if one.panel in used
+        {"id": curve.panel, "title": curve.title, "open": _opens(curve, runs)}
+        for curve in sorted(
+            filter(None, [*(quantity.curve for quantity in placed()), TORQUES]), key=lambda x: x.place
+        )
+        if curve.panel in used
     ]
-    drawing.add("curves", panels=panels, lanes=list(lanes.values()), runs=found)
+    drawing.add("curves", panels=panels, lanes=list(lanes.values()), runs=data)
 
 
 def _opens(curve: Curve, runs: Sequence[Channels]) -> bool:
     if curve.panel == "partition":
         return any(len(run.partitions) > 1 for run in runs)
-    those = [one.values for run in runs for one in run.channels if one.panel == curve.panel]
-    return any(x[np.isfinite(x)].min(initial=1.0) < curve.opens_below for x in those)
+    series = [channel.values for run in runs for channel in run.channels if channel.panel == curve.panel]
+    return any(x[np.isfinite(x)].min(initial=1.0) < curve.opens_below for x in series)
 
 
 MOST = 100
@@ -269,7 +283,7 @@ def draw_facts(
     start: float,
 ) -> None:
     """Append the command "facts", unless all runs are mere motions; `start` is the page's first time, s."""
-    found = []
+    data = []
     for run, channels, look in zip(runs, plotted, looks, strict=True):
         facts: list[tuple[str, str]] = []
         happened: list[tuple[float, str]] = []
@@ -278,13 +292,13 @@ def draw_facts(
             facts += summary_rows(run, numbers, events=False)  # they have their own list
             facts += [("message", run.message)] * bool(run.message)
             facts += [("warning", warning) for warning in numbers["warnings"]]
-            facts += [("motors", str(one)) for one in motor_findings(run)]
+            facts += [("motors", str(finding)) for finding in motor_findings(run)]
             happened = sorted(events(run, channels))
-        told = [[t - start, text] for t, text in happened[:MOST]]
+        shown = [[t - start, text] for t, text in happened[:MOST]]
         more = max(len(happened) - MOST, 0)
-        found.append({"name": look.name, "facts": facts, "events": told, "more": more})
-    if any(one["facts"] for one in found):
-        drawing.add("facts", runs=found)
+        data.append({"name": look.name, "facts": facts, "events": shown, "more": more})
+    if any(of_run["facts"] for of_run in data):
+        drawing.add("facts", runs=data)
 
 
 def events(run: Trajectory, channels: Channels) -> Iterator[tuple[float, str]]:
@@ -293,12 +307,12 @@ def events(run: Trajectory, channels: Channels) -> Iterator[tuple[float, str]]:
     for event in run.events:
         yield event.t, f"{event.task} {event.what}{f': {event.why}' if event.why else ''}"
     if len(run.shares) == len(run):
-        inputs = {f"u_{one}": input_text(run.robot, i) for i, one in enumerate(run.robot.u_names)}
+        inputs = {f"u_{u_name}": input_text(run.robot, i) for i, u_name in enumerate(run.robot.u_names)}
         for name, share in zip(run.limit_names, run.shares.T, strict=True):
             for words, margin in (("lower", share), ("upper", 1.0 - share)):
                 for k in _reached(margin):
                     yield float(run.t[k]), f"{inputs.get(name, pretty(name))} reaches its {words} limit"
-    number = next((one.values for one in channels.channels if one.name == "partition"), None)
+    number = next((channel.values for channel in channels.channels if channel.name == "partition"), None)
     if number is not None:
         for last in np.flatnonzero(np.diff(number)):
             before, after = (channels.partitions[int(number[i])] for i in (last, last + 1))
@@ -307,8 +321,8 @@ def events(run: Trajectory, channels: Channels) -> Iterator[tuple[float, str]]:
         yield t, "J_e was singular on the way from the sample before"
     if (jumps := chattering(run.t, run.u, run.robot.u_names)) is not None:
         yield jumps.where["t"], str(jumps)
-    for one in motor_findings(run):
-        yield one.where["t"], str(one)
+    for finding in motor_findings(run):
+        yield finding.where["t"], str(finding)
     if (settles := settling_time(run)) is not None:
         yield float(run.t[0]) + settles, "‖e‖ down to 2 % of its start"
     if len(run) and (run.verdict.reasons or not run.complete):

@@ -89,6 +89,6 @@ def page_times(t: Array) -> tuple[Array, Array]:
     times = t.astype(np.float32)
     if times[-1] > t[-1]:
         times[-1] = np.nextafter(times[-1], np.float32(0.0))
-    kept = np.concatenate([times[:-1] < times[-1], [True]])
-    kept[1:-1] &= np.diff(times)[:-1] > 0.0
-    return times[kept], kept
+    distinct = np.concatenate([times[:-1] < times[-1], [True]])
+    distinct[1:-1] &= np.diff(times)[:-1] > 0.0
+    return times[distinct], distinct

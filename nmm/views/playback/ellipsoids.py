@@ -61,8 +61,8 @@ class SceneEllipsoids:
                 middle = 0.5 * (q[1:] + q[:-1])
                 exact = drawn_ellipsoids(options, robot, name, middle) if len(middle) else {}
                 bad = np.zeros(len(middle), dtype=bool)
-                for part, there in exact.items():
-                    bad |= between_error(parts[part], there, self.scale) > CLOSE * room
+                for part, ellipsoids in exact.items():
+                    bad |= between_error(parts[part], ellipsoids, self.scale) > CLOSE * room
                 if not bad.any():
                     break
                 at = np.flatnonzero(bad) + 1
@@ -80,25 +80,25 @@ class SceneEllipsoids:
         enlarged = boxes.copy()
         for i, (t, parts) in enumerate(zip(self.t, self.parts, strict=True)):
             box = enlarged[i].swapaxes(0, 1)
-            for part, found in parts.items():
-                half = np.linalg.norm(found.axes * self.radii(i, part)[:, None], axis=2)
-                np.minimum(box[0], interpolated(times, t, found.center - half), out=box[0])
-                np.maximum(box[1], interpolated(times, t, found.center + half), out=box[1])
+            for part, ellipsoids in parts.items():
+                half = np.linalg.norm(ellipsoids.axes * self.radii(i, part)[:, None], axis=2)
+                np.minimum(box[0], interpolated(times, t, ellipsoids.center - half), out=box[0])
+                np.maximum(box[1], interpolated(times, t, ellipsoids.center + half), out=box[1])
         return enlarged
 
     def draw(self, drawing: Drawing, motion: int, path: str, color: Rgb, start: float) -> list[Command]:
         """Draw one motion's below `path`; returns their animations. Times count from `start`."""
         parts, group = self.parts[motion], f"{path}/ellipsoids"
-        times, kept = page_times(self.t[motion] - start)
-        center = parts[WHOLE].center[kept]
+        times, distinct = page_times(self.t[motion] - start)
+        center = parts[WHOLE].center[distinct]
         place = np.eye(4)
         place[:3, 3] = center[0]
         drawing.transform(group, place)
         animations = animation(group, times, {"position": center})
         for after, part in enumerate(reversed(parts)):
-            node, radii = f"{group}/{part}", self.radii(motion, part)[kept]
+            node, radii = f"{group}/{part}", self.radii(motion, part)[distinct]
             turned = np.tile(np.eye(4), (len(times), 1, 1))
-            turned[:, :3, :3] = parts[part].axes[kept]
+            turned[:, :3, :3] = parts[part].axes[distinct]
             shade = list(ARM_COLOR if part == ARM else color)
             drawing.add("ellipsoid", path=node, color=shade, opacity=OPACITY[part], after=after)
             drawing.transform(node, turned[0] @ np.diag([*radii[0], 1.0]))

@@ -42,10 +42,10 @@ def robot_boxes(robot: Robot, q: Array, wheels: Array, *, carried: Sequence[Carr
             for box, placement in zip(local, geometry_data.oMg, strict=True)
             if box is not None
         ]
-        for one in carried:
-            if (box := shape_corners(one.geometry)) is not None:
-                frame = model.frames[model.getFrameId(one.frame)]
-                place = (data.oMi[frame.parentJoint] * frame.placement).homogeneous @ one.place
+        for item in carried:
+            if (box := shape_corners(item.geometry)) is not None:
+                frame = model.frames[model.getFrameId(item.frame)]
+                place = (data.oMi[frame.parentJoint] * frame.placement).homogeneous @ item.place
                 points.append(box @ place[:3, :3].T + place[:3, 3])
         # A robot of shapes without bounds is as large as its skeleton.
         everything = np.vstack(points or [data.oMi[i].translation for i in range(model.njoints)])

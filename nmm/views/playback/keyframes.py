@@ -70,16 +70,16 @@ def ghost_times(start: float, end: float, times: Array, boxes: Array) -> list[fl
     others, as far as there are any: boxes (K, 2, 3) around it at times (K,)."""
     best: list[float] = []
     for step in _round_steps(end - start):
-        found: list[float] = []
+        chosen: list[float] = []
         around: list[Array] = []
         for k in range(int(np.ceil(start / step - 1e-9)), int(np.floor(end / step + 1e-9)) + 1):
             box = interpolated(np.array([k * step]), times, boxes.reshape(len(boxes), 6))[0].reshape(2, 3)
             if all(_shared(box, other) <= SHARED for other in around):
-                found.append(k * step)
+                chosen.append(k * step)
                 around.append(box)
-        while len(found) > MOST_GHOSTS:
-            found = found[::2]
-        best = max(best, found, key=len)
+        while len(chosen) > MOST_GHOSTS:
+            chosen = chosen[::2]
+        best = max(best, chosen, key=len)
         if len(best) >= MOST_GHOSTS - 1:
             break
     return best if len(best) > 1 else []
@@ -97,7 +97,7 @@ def _round_steps(duration: float) -> list[float]:
 def _shared(box: Array, other: Array) -> float:
     """Which share of the smaller of two boxes (2, 3) the other one covers, from above."""
     sides = np.minimum(box[1], other[1])[:2] - np.maximum(box[0], other[0])[:2]
-    areas = [float(np.prod(np.ptp(one, axis=0)[:2])) for one in (box, other)]
+    areas = [float(np.prod(np.ptp(corners, axis=0)[:2])) for corners in (box, other)]
     return float(np.prod(np.maximum(sides, 0.0))) / max(min(areas), 1e-12)
 
 

@@ -46,7 +46,7 @@ def mesh_pieces(geometry: pin.GeometryObject, off: float = OFF) -> list[MeshPiec
         return loaded
     scale = np.asarray(geometry.meshScale, dtype=float)
     way = -1 if np.prod(scale) < 0.0 else 1
-    scaled = [MeshPiece(one.vertices * scale, one.faces[:, ::way], one.color) for one in pieces]
+    scaled = [MeshPiece(piece.vertices * scale, piece.faces[:, ::way], piece.color) for piece in pieces]
     if not loaded:
         return scaled
     box = _box(loaded)
@@ -70,15 +70,15 @@ def _light(mesh: trimesh.Trimesh, off: float) -> tuple[Array, Indices]:
 
     mesh = mesh.copy()
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    given = np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=np.uint32)
+    original = np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=np.uint32)
     # Of a part that is thinner than this nothing would be left: then by less.
     vertices, faces = next(
         (
-            found
+            lighter
             for finer in range(5)
-            if len((found := decimated(*given, off / 2.0**finer))[1]) < len(given[1])
+            if len((lighter := decimated(*original, off / 2.0**finer))[1]) < len(original[1])
         ),
-        given,
+        original,
     )
     mesh = trimesh.graph.smooth_shade(trimesh.Trimesh(vertices, faces, process=False), angle=SMOOTH)
     return np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=np.uint32)
@@ -133,13 +133,13 @@ def decimated(vertices: Array, faces: Indices, off: float) -> tuple[Array, Indic
     )
     if closed.status() != manifold3d.Error.NoError:
         return vertices, faces
-    found = closed.simplify(off).to_mesh()
-    runs = zip(found.run_original_id, found.run_index, found.run_index[1:], strict=False)
-    kept = [found.tri_verts[start // 3 : end // 3] for run, start, end in runs if run == own]
-    used, numbered = np.unique(np.vstack([np.zeros((0, 3), np.uint32), *kept]), return_inverse=True)
+    mesh = closed.simplify(off).to_mesh()
+    runs = zip(mesh.run_original_id, mesh.run_index, mesh.run_index[1:], strict=False)
+    triangles = [mesh.tri_verts[start // 3 : end // 3] for run, start, end in runs if run == own]
+    used, numbered = np.unique(np.vstack([np.zeros((0, 3), np.uint32), *triangles]), return_inverse=True)
     if not len(used):
         return vertices, faces
-    return np.array(found.vert_properties[used, :3], dtype=float), numbered.reshape(-1, 3).astype(np.uint32)
+    return np.array(mesh.vert_properties[used, :3], dtype=float), numbered.reshape(-1, 3).astype(np.uint32)
 
 
 def _cut(faces: Indices) -> tuple[Integers, Flags]:

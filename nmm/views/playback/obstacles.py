@@ -39,7 +39,10 @@ class SceneObstacles:
         # The longest run first: those that ended early share its obstacles.
         for motion in sorted(motions, key=lambda motion: -len(motion.t)):
             beside = motion.surroundings.scenery
-            for body, stands in [*((one, False) for one in motion.bodies), *((one, True) for one in beside)]:
+            for body, stands in [
+                *((body, False) for body in motion.bodies),
+                *((body, True) for body in beside),
+            ]:
                 if not any(_same(body, motion, *other) for other in self.drawn):
                     self.drawn.append((body, motion))
                     self._scenery.append(stands)
@@ -49,7 +52,7 @@ class SceneObstacles:
         middle, half = self._room.mean(axis=0), 0.5 * np.ptp(self._room, axis=0)
         # As much again on each side as the room is wide, so that a wall's end is seen where it is near.
         around = half + max(0.5 * float(np.linalg.norm(half)), 0.5)
-        found = [np.zeros((0, 3))]
+        corners = [np.zeros((0, 3))]
         for body, motion in self.drawn:
             if (box := shape_corners(body.geometry)) is None:
                 continue
@@ -58,8 +61,8 @@ class SceneObstacles:
             for place in places[::every]:
                 at = box @ place[:3, :3].T + place[:3, 3]
                 if np.all(at.min(axis=0) < middle + around) and np.all(at.max(axis=0) > middle - around):
-                    found.append(np.clip(at, middle - around, middle + around))
-        return np.vstack(found)
+                    corners.append(np.clip(at, middle - around, middle + around))
+        return np.vstack(corners)
 
     def draw(self, drawing: Drawing, size: float, start: float) -> list[Command]:
         """Draw them; returns their animations. `size` is half the diagonal of what is shown, m."""
@@ -77,15 +80,15 @@ class SceneObstacles:
                 top = _top(body)
             drawing.add("obstacle", path=path, name=body.name, color=list(color), top=top.tolist())
             if len(body.places) > 1:
-                kept = samples_kept(motion.t, self._fps)
-                times, distinct = page_times(motion.t[kept] - start)
-                positions, quaternions = position_and_quaternion(body.places[kept][distinct])
+                samples = samples_kept(motion.t, self._fps)
+                times, distinct = page_times(motion.t[samples] - start)
+                positions, quaternions = position_and_quaternion(body.places[samples][distinct])
                 animations += animation(path, times, {"position": positions, "quaternion": quaternions})
         return animations
 
     def tell(self, drawing: Drawing) -> None:
         for text, stands, color in (("obstacle", False, OBSTACLE), ("scenery", True, SCENERY)):
-            paths = [f"/nmm/obstacle {i}" for i, one in enumerate(self._scenery) if one is stands]
+            paths = [f"/nmm/obstacle {i}" for i, fixed in enumerate(self._scenery) if fixed is stands]
             if paths:
                 text += "s" * (len(paths) > 1 and not stands)
                 drawing.add("obstacles", text=text, paths=paths, color=list(color))
@@ -107,11 +110,11 @@ def draw_nearest(
     drawing: Drawing, motion: Motion, path: str, color: Rgb | None, start: float, fps: float
 ) -> None:
     """The line between a motion's nearest points, in the motion's colour where there are several."""
-    found: Nearest | None = motion.nearest
-    if found is None or not np.isfinite(found.distance).any():
+    nearest: Nearest | None = motion.nearest
+    if nearest is None or not np.isfinite(nearest.distance).any():
         return
-    kept = samples_kept(motion.t, fps)
-    shown = (found.pairs[kept] >= 0) & (found.distance[kept] < found.asked + REACH)
+    samples = samples_kept(motion.t, fps)
+    shown = (nearest.pairs[samples] >= 0) & (nearest.distance[samples] < nearest.asked + REACH)
     if not shown.any():
         return
     drawing.add(
@@ -120,20 +123,20 @@ def draw_nearest(
         of=motion.label if color is not None else "",
         color=list(NEAR if color is None else color),
         alarm=list(TOO_NEAR),
-        times=packed(motion.t[kept] - start, np.float64),
-        points=packed(np.where(shown[:, np.newaxis], found.points[kept], 0.0), np.float64),
-        distance=packed(np.where(shown, found.distance[kept], 1e9), np.float64),
-        pairs=np.where(shown, found.pairs[kept], -1).tolist(),
-        names=list(found.names),
-        told=_told(motion, found),
-        asked=found.asked - ROUNDING,
+        times=packed(motion.t[samples] - start, np.float64),
+        points=packed(np.where(shown[:, np.newaxis], nearest.points[samples], 0.0), np.float64),
+        distance=packed(np.where(shown, nearest.distance[samples], 1e9), np.float64),
+        pairs=np.where(shown, nearest.pairs[samples], -1).tolist(),
+        names=list(nearest.names),
+        told=_told(motion, nearest),
+        asked=nearest.asked - ROUNDING,
     )
 
 
-def _told(motion: Motion, found: Nearest) -> list[bool]:
+def _told(motion: Motion, nearest: Nearest) -> list[bool]:
     """Which pairs' distances are written into the scene: with obstacles those to them, not a robot's own."""
     obstacles = {body.name for body in motion.bodies}
-    return [not obstacles or any(name in obstacles for name in pair.split(" and ")) for pair in found.names]
+    return [not obstacles or any(name in obstacles for name in pair.split(" and ")) for pair in nearest.names]
 
 
 def _same(body: Body, motion: Motion, other: Body, others: Motion) -> bool:

@@ -64,9 +64,9 @@ class Placements:
         """Placement of each joint in the world, (joints, 4, 4)."""
         return self._matrices(q, wheels, self._data.oMi)
 
-    def _matrices(self, q: Array, wheels: Array, found: Sequence[pin.SE3]) -> Array:
+    def _matrices(self, q: Array, wheels: Array, placements: Sequence[pin.SE3]) -> Array:
         pin.forwardKinematics(self.model, self._data, self.configuration(q, wheels))
-        return np.array([found[i].homogeneous for i in range(1, self.model.njoints)]).reshape(-1, 4, 4)
+        return np.array([placements[i].homogeneous for i in range(1, self.model.njoints)]).reshape(-1, 4, 4)
 
 
 def position_and_quaternion(matrices: Array) -> tuple[Array, Array]:
@@ -188,13 +188,13 @@ class Carriers:
     def moving_inputs(self, carrier: int, point: Array) -> list[int]:
         """Inputs that move a body's point (2,), along its level axes, at some configuration."""
         random = np.random.default_rng(0)
-        found = np.zeros(self.robot.n_u, dtype=bool)
+        moving = np.zeros(self.robot.n_u, dtype=bool)
         for _ in range(_PROBES):
             q = random.uniform(-0.5, 0.5, self.robot.n)
             for j, column in enumerate(self.robot.S(q).T):
                 velocity = at_point(self.twists(q, column)[carrier], point)
-                found[j] |= bool(np.linalg.norm(velocity) > 1e-9)
-        return [int(j) for j in np.flatnonzero(found)]
+                moving[j] |= bool(np.linalg.norm(velocity) > 1e-9)
+        return [int(j) for j in np.flatnonzero(moving)]
 
 
 def at_point(twist: Array, point: Array) -> Array:

@@ -54,7 +54,9 @@ class Rolling:
         names = self.joints[len(wheels) :]
         self._swivels = [Swivel.of(robot, self._carriers, name, wheels) for name in names]
         swivels = zip(names, self._swivels, strict=True)
-        self.steered = tuple(name for name, one in swivels if one.drive is not None and not one.trail)
+        self.steered = tuple(
+            name for name, swivel in swivels if swivel.drive is not None and not swivel.trail
+        )
 
     def rates(self, q: ArrayLike, u: ArrayLike, angles: ArrayLike | None = None) -> Array:
         """Rates (D,) rad/s at q (n,) for constant inputs u (n_u,) and angles (D,), those of `settled` when
@@ -214,17 +216,17 @@ class Swivel:
         own = [(index, wheel) for index, wheel in enumerate(wheels) if wheel.swivel == name]
         carrier = carriers.names.index(own[0][1].carrier)
         pivot = carriers.planar(carrier, own[0][1].pivot)
-        found: list[SwivelWheel] = []
+        swivel_wheels: list[SwivelWheel] = []
         for index, wheel in own:
             left = carriers.planar(carrier, wheel.axis)
             ahead = np.array([left[1], -left[0]])
             offset = carriers.planar(carrier, wheel.center) - pivot
-            same = float(np.sign(ahead @ found[0].ahead)) if found else 1.0
+            same = float(np.sign(ahead @ swivel_wheels[0].ahead)) if swivel_wheels else 1.0
             trail, side = float(offset @ ahead), float(offset @ left)
-            found.append(SwivelWheel(index, wheel.radius, ahead, trail, side, same))
+            swivel_wheels.append(SwivelWheel(index, wheel.radius, ahead, trail, side, same))
         inputs = carriers.moving_inputs(carrier, pivot)
         drive = inputs[0] if len(inputs) == 1 else None
-        return cls(robot, carriers, carrier, pivot, tuple(found), _sign(robot, name), drive)
+        return cls(robot, carriers, carrier, pivot, tuple(swivel_wheels), _sign(robot, name), drive)
 
     @property
     def trail(self) -> float:

@@ -142,15 +142,17 @@ def playback_scene(
             _line(drawing, f"{path}/plan", DESIRED, planned[drawn], thick=0.6)
         animations += draw_cameras(drawing, motion, robot, path, start, fps, size)
         if motion.believed is not None:
-            there = replace(motion, q=motion.believed, path=None)
-            animations += _believed(drawing, there, wheels[i], path, len(motions) + i, start, fps)
+            believed = replace(motion, q=motion.believed, path=None)
+            animations += _believed(drawing, believed, wheels[i], path, len(motions) + i, start, fps)
         draw_nearest(drawing, motion, path, color if several else None, start, fps)
         if shown is not None:
             animations += shown.draw(drawing, i, path, color, start)
     obstacles.tell(drawing)
     _tell_carried(drawing, motions)
     tell_cameras(drawing, [camera for motion in motions for camera in motion.cameras])
-    if paths := [f"/nmm/motion {i}/believed" for i, one in enumerate(motions) if one.believed is not None]:
+    if paths := [
+        f"/nmm/motion {i}/believed" for i, motion in enumerate(motions) if motion.believed is not None
+    ]:
         drawing.add("believed", paths=paths, color=list(BELIEVED))
     _desired(drawing, motions)
     _targets(drawing, motions, size)
@@ -211,14 +213,17 @@ def live_scene(
 def still(robot: Robot, q: Array, obstacles: Iterable[Obstacle], **beside: Any) -> Motion:
     """A robot that stands at q (n,), with obstacles as at t = 0, and what else is beside it."""
     now = np.zeros(1)
-    bodies = tuple(Body(one.name, one.shape.geometry(), obstacle_places(one, now)) for one in obstacles)
+    bodies = tuple(
+        Body(obstacle.name, obstacle.shape.geometry(), obstacle_places(obstacle, now))
+        for obstacle in obstacles
+    )
     return Motion(robot, now, q[np.newaxis], np.zeros((1, robot.n_u)), bodies=bodies, **beside)
 
 
 def points_beside(motion: Motion, boxes: Array) -> Array:
     """Points (K, 3), m, of what is beside a robot: its desired path, target and bodies near it."""
-    given = [np.atleast_2d(one) for one in (motion.desired, motion.target) if one is not None]
-    return np.vstack([*given, SceneObstacles([motion], boxes[np.newaxis], 1.0).points()])
+    parts = [np.atleast_2d(points) for points in (motion.desired, motion.target) if points is not None]
+    return np.vstack([*parts, SceneObstacles([motion], boxes[np.newaxis], 1.0).points()])
 
 
 def draw_beside(
@@ -253,7 +258,7 @@ def _ellipsoids(
 
 def _tell_carried(drawing: Drawing, motions: Sequence[Motion]) -> None:
     """Append what names the things that are carried."""
-    for name in dict.fromkeys(one.name for motion in motions for one in motion.surroundings.carried):
+    for name in dict.fromkeys(item.name for motion in motions for item in motion.surroundings.carried):
         drawing.add("carried", name=name, color=list(CARRIED))
 
 
@@ -288,8 +293,8 @@ def _desired(drawing: Drawing, motions: Sequence[Motion]) -> None:
         path = motion.desired
         if path is None or any(path.shape == other.shape and np.allclose(path, other) for other in seen):
             continue
-        kept = np.unique(np.linspace(0, len(path) - 1, MOST_FRAMES).astype(int))
-        _line(drawing, f"/nmm/desired {len(seen)}", DESIRED, path[kept])
+        samples = np.unique(np.linspace(0, len(path) - 1, MOST_FRAMES).astype(int))
+        _line(drawing, f"/nmm/desired {len(seen)}", DESIRED, path[samples])
         seen.append(path)
 
 
@@ -302,8 +307,8 @@ def _line(
 
 
 def _targets(drawing: Drawing, motions: Sequence[Motion], size: float) -> None:
-    given = [motion.target for motion in motions if motion.target is not None]
-    targets = {tuple(target) for several in given for target in np.atleast_2d(several).tolist()}
+    positions = [motion.target for motion in motions if motion.target is not None]
+    targets = {tuple(target) for several in positions for target in np.atleast_2d(several).tolist()}
     radius = min(max(0.015 * size, 0.02), 0.2)
     for i, (x, y, z) in enumerate(sorted(targets)):
         path = f"/nmm/target {i}"

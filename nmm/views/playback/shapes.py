@@ -64,19 +64,19 @@ class DrawnRobot:
     def frame_node(self, drawing: Drawing, frame: str, name: str) -> str:
         """Draw a node of that name at a frame; returns its path."""
         model = self.placements.model
-        found = model.frames[model.getFrameId(frame)]
-        path = f"{self._below[found.parentJoint]}/{segment(name)}"
-        drawing.transform(path, np.array(found.placement.homogeneous))
+        model_frame = model.frames[model.getFrameId(frame)]
+        path = f"{self._below[model_frame.parentJoint]}/{segment(name)}"
+        drawing.transform(path, np.array(model_frame.placement.homogeneous))
         return path
 
     def carry(self, drawing: Drawing, carried: Sequence[Carried]) -> None:
         """Draw what frames carry, as a part of the robot."""
         model = self.placements.model
-        for i, one in enumerate(carried):
-            frame = model.frames[model.getFrameId(one.frame)]
-            path = f"{self._below[frame.parentJoint]}/visual carried {i} {segment(one.name)}"
-            drawing.transform(path, frame.placement.homogeneous @ one.place)
-            for k, shape in enumerate(shapes(pin.GeometryObject(one.name, 0, pin.SE3(), one.geometry))):
+        for i, item in enumerate(carried):
+            frame = model.frames[model.getFrameId(item.frame)]
+            path = f"{self._below[frame.parentJoint]}/visual carried {i} {segment(item.name)}"
+            drawing.transform(path, frame.placement.homogeneous @ item.place)
+            for k, shape in enumerate(shapes(pin.GeometryObject(item.name, 0, pin.SE3(), item.geometry))):
                 drawing.object(f"{path}/{k}", shape.geometry, CARRIED)
                 drawing.transform(f"{path}/{k}", shape.matrix)
 
@@ -96,8 +96,8 @@ class DrawnRobot:
         """MeshCat's animations: a clip for each moving joint. Times count from `start`."""
         poses = zip(frames.q, frames.wheels, strict=True)
         matrices = np.array([self.placements.relative(*pose) for pose in poses])
-        times, kept = page_times(frames.t - start)
-        positions, quaternions = position_and_quaternion(matrices[kept])
+        times, distinct = page_times(frames.t - start)
+        positions, quaternions = position_and_quaternion(matrices[distinct])
         animations = []
         for path, place, turn in zip(
             self.paths, positions.swapaxes(0, 1), quaternions.swapaxes(0, 1), strict=True
@@ -143,11 +143,11 @@ def shapes(geometry: pin.GeometryObject, off: float = OFF) -> list[Shape]:
     if primitive is not None:
         data, matrix = primitive
         return [Shape(data, color, matrix)]
-    found = []
+    drawn = []
     for piece in mesh_pieces(geometry, off):
         own = color if piece.color is None or geometry.overrideMaterial else piece.color
-        found.append(Shape(triangles(piece.vertices, piece.faces), own, np.eye(4)))
-    return found
+        drawn.append(Shape(triangles(piece.vertices, piece.faces), own, np.eye(4)))
+    return drawn
 
 
 def triangles(vertices: Array, faces: Indices) -> dict[str, Any]:

@@ -185,7 +185,9 @@ def _solids(robot: Robot, joints: Container[int]) -> list[pin.GeometryObject]:
     except RobotError:  # not from a file: the wheels' shapes are those of what carries them
         names, collisions = robot.model.names, robot.shapes.collision_model
     places = {i: display.getJointId(name) for i, name in enumerate(names) if display.existJointName(name)}
-    drawn = [one for one in collisions.geometryObjects if places.get(one.parentJoint) in joints]
+    drawn = [
+        geometry for geometry in collisions.geometryObjects if places.get(geometry.parentJoint) in joints
+    ]
     read_meshes(drawn, robot.name)
     solids = [pin.GeometryObject(geometry) for geometry in drawn]
     for geometry in solids:

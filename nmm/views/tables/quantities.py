@@ -62,9 +62,11 @@ def comparison_table(trajectories: Sequence[Trajectory]) -> Table:
     quantities = []
     for key, name, unit, latex in _rows(trajectories):
         outer, _, inner = key.partition(".")
-        found = [one.get(outer) if not inner else one.get(outer, {}).get(inner) for one in summaries]
+        entries = [
+            summary.get(outer) if not inner else summary.get(outer, {}).get(inner) for summary in summaries
+        ]
         has = [_OF[key](run) if key in _OF else True for run in trajectories]
-        values = tuple(value if there else None for value, there in zip(found, has, strict=True))
+        values = tuple(value if known else None for value, known in zip(entries, has, strict=True))
         if any(value not in (None, _USUAL.get(key)) for value in values):
             quantities.append(Quantity(key, name, latex, unit, values, _NOTHING.get(key)))
     return Table(tuple(trajectory.called for trajectory in trajectories), tuple(quantities))
@@ -80,26 +82,26 @@ def laps_table(found: Repeatability) -> Table:
     >>> [quantity.name for quantity in nmm.laps_table(found).quantities]
     ['posture drift, lap 1', 'platform displacement, lap 1', 'task error, lap 1']
     """
-    rows = max((len(one.distance) for one in found.laps), default=0)
-    names = dict.fromkeys(name for one in found.laps for name in one.trajectory.r_units)
+    rows = max((len(run.distance) for run in found.laps), default=0)
+    names = dict.fromkeys(name for run in found.laps for name in run.trajectory.r_units)
 
     def after(lap: int, numbers: Callable[[Any], Any]) -> tuple[Value, ...]:
-        return tuple(float(numbers(one)[lap]) if lap < len(numbers(one)) else None for one in found.laps)
+        return tuple(float(numbers(run)[lap]) if lap < len(numbers(run)) else None for run in found.laps)
 
     quantities = []
     for k in range(rows):
         for key, name, unit, numbers in (
-            ("distance", "posture drift", "m, rad", lambda one: one.distance),
-            ("displacement", "platform displacement", "m", lambda one: one.displacement),
-            ("errors", "task error", ", ".join(names), lambda one: one.errors[1:]),
+            ("distance", "posture drift", "m, rad", lambda run: run.distance),
+            ("displacement", "platform displacement", "m", lambda run: run.displacement),
+            ("errors", "task error", ", ".join(names), lambda run: run.errors[1:]),
         ):
             text = f"{name}, lap {k + 1}"
             quantities.append(Quantity(f"{key}.{k + 1}", text, text, unit, after(k, numbers)))
     last = "last drift over that before"
-    factors = Quantity("factor", last, last, "", tuple(one.factor for one in found.laps))
+    factors = Quantity("factor", last, last, "", tuple(run.factor for run in found.laps))
     if any(factor is not None for factor in factors.values):
         quantities.append(factors)
-    return Table(tuple(one.name.upper() for one in found.laps), tuple(quantities))
+    return Table(tuple(run.name.upper() for run in found.laps), tuple(quantities))
 
 
 def _rows(runs: Sequence[Trajectory]) -> Iterator[tuple[str, str, str, str]]:
@@ -110,13 +112,13 @@ def _rows(runs: Sequence[Trajectory]) -> Iterator[tuple[str, str, str, str]]:
     }
     yield "outcome", "outcome", "", "outcome"
     yield "dt", "step", "s", "step"
-    named = [*named_numbers(), *((one.unit, one) for one in RUN_NUMBERS if one.name)]
+    named = [*named_numbers(), *((number.unit, number) for number in RUN_NUMBERS if number.name)]
     by_key = {number.key: (unit, number) for unit, number in named}
     for key in dict.fromkeys((*_FIRST, *by_key)):
         unit, number = by_key[key]
         if key == "u_max":
-            for one, own in inputs.items():
-                yield f"{key}.{one}", number.name.format(one), own, number.latex.format(_size(one))
+            for u_name, own in inputs.items():
+                yield f"{key}.{u_name}", number.name.format(u_name), own, number.latex.format(_size(u_name))
         elif objective or not key.startswith("objective_"):
             yield key, number.name, units.get(unit, unit), number.latex or number.name
 

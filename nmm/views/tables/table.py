@@ -72,17 +72,18 @@ class Table:
     @property
     def read(self) -> tuple[Quantity, ...]:
         """The rows to be read: those that say something."""
-        return tuple(one for one in self.quantities if one.says_something)
+        return tuple(quantity for quantity in self.quantities if quantity.says_something)
 
     def latex(self) -> str:
         """A tabular of package booktabs, with a column a run: three digits, powers of ten, names escaped."""
         from nmm import __version__
 
         rows = [["", *map(latex.escaped, self.runs)]]
-        for one in self.read:
-            unit = re.sub(r"\\textasciicircum\{\}(-?\d+)", r"$^{\1}$", latex.escaped(one.unit))  # m^2 raised
+        for quantity in self.read:
+            # The exponent of m^2 is raised.
+            unit = re.sub(r"\\textasciicircum\{\}(-?\d+)", r"$^{\1}$", latex.escaped(quantity.unit))
             unit = unit and f" ({unit})"
-            rows.append([one.latex + unit, *map(_latex_value, one.values)])
+            rows.append([quantity.latex + unit, *map(_latex_value, quantity.values)])
         head, *body = (" & ".join(row) + r" \\" for row in rows)
         return "\n".join(
             [
@@ -95,20 +96,23 @@ class Table:
 
     def csv(self) -> str:
         """A line a run under names with units: the numbers of summary.json, to the last digit."""
-        names = [f"{one.key} [{one.unit}]" if one.unit else one.key for one in self.quantities]
+        names = [
+            f"{quantity.key} [{quantity.unit}]" if quantity.unit else quantity.key
+            for quantity in self.quantities
+        ]
         text = io.StringIO()
         written = csv.writer(text, lineterminator="\n")
         written.writerow(["run", *names])
         for k, run in enumerate(self.runs):
-            written.writerow([run, *(one.values[k] for one in self.quantities)])
+            written.writerow([run, *(quantity.values[k] for quantity in self.quantities)])
         return text.getvalue()
 
     def markdown(self) -> str:
         """A table as GitHub and most others read it, with a column a run."""
         rows = [["", *map(_markdown, self.runs)], ["---", *("---:" for _ in self.runs)]]
-        for one in self.read:
-            name = _markdown(f"{one.name} ({one.unit})" if one.unit else one.name)
-            rows.append([name, *(_markdown(_plain_value(value)) for value in one.values)])
+        for quantity in self.read:
+            name = _markdown(f"{quantity.name} ({quantity.unit})" if quantity.unit else quantity.name)
+            rows.append([name, *(_markdown(_plain_value(value)) for value in quantity.values)])
         return "".join(f"| {' | '.join(row)} |\n" for row in rows)
 
     def save(self, path: str | Path) -> Path:

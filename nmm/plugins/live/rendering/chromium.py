@@ -39,8 +39,8 @@ PATIENCE = 60.0
 
 def find_browser() -> str:
     """Chromium's or Chrome's program; `RunError` if there is none."""
-    if found := next(filter(None, map(shutil.which, NAMES)), None):
-        return found
+    if program := next(filter(None, map(shutil.which, NAMES)), None):
+        return program
     raise RunError(
         "videos need Chromium or Chrome, and none is installed (Debian: apt-get install chromium); "
         f"looked for {', '.join(NAMES)}"
@@ -88,7 +88,7 @@ class HeadlessPage:
 
     def _open(self) -> None:
         pages = self._ask("Target.getTargets")["targetInfos"]
-        page = next(one["targetId"] for one in pages if one["type"] == "page")
+        page = next(target["targetId"] for target in pages if target["type"] == "page")
         self._session = self._ask("Target.attachToTarget", targetId=page, flatten=True)["sessionId"]
         width, height = self._size
         self._ask(
@@ -114,8 +114,8 @@ class HeadlessPage:
             answer = json.loads(self._message(end))
         if "error" in answer:
             raise RunError(f"{self._browser}: {method}: {answer['error'].get('message')}")
-        found: dict[str, Any] = answer["result"]
-        return found
+        result: dict[str, Any] = answer["result"]
+        return result
 
     def _message(self, end: float) -> bytes:
         while b"\0" not in self._read:

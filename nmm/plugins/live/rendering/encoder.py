@@ -31,8 +31,8 @@ def expect_video(file: Path) -> Path:
 
 def find_ffmpeg() -> str:
     """The system's ffmpeg, or the one of the package imageio-ffmpeg; `RunError` for none."""
-    if found := shutil.which("ffmpeg"):
-        return found
+    if program := shutil.which("ffmpeg"):
+        return program
     try:
         import imageio_ffmpeg
 

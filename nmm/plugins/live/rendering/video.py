@@ -100,7 +100,7 @@ def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
 def _times(
     motions: Sequence[Shown], start: float | None, end: float | None, fps: float, speed: float
 ) -> list[float]:
-    first, last = min(float(one.t[0]) for one in motions), max(float(one.t[-1]) for one in motions)
+    first, last = min(float(run.t[0]) for run in motions), max(float(run.t[-1]) for run in motions)
     begin, stop = first if start is None else start, last if end is None else end
     expected = f"instants of the run, from {first:g} to {last:g} s, one after the other"
     expect(first <= begin <= stop <= last, "start and end (--from, --to)", expected, (begin, stop))
