@@ -18,13 +18,13 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
 from nmm.base.arrays import Array, counted
 from nmm.base.errors import expect
 from nmm.base.kernels.compiled import Kernel, caller, compiled
 from nmm.base.kernels.record_layout import IntegerVector, Matrices, Matrix, Vector, record_type
 from nmm.base.kernels.records import Frames
+from nmm.base.kernels.signatures import float64, void
 from nmm.base.kernels.velocity_map import to_inputs
 from nmm.model.robots.robot import Robot
 
@@ -81,14 +81,12 @@ class LimitRows(NamedTuple):
 
 
 #: The signature of a limit's kernel: (sample, frames, numbers, rows).
-LIMIT_ROWS = types.void(
-    record_type(LimitSample), record_type(Frames), types.float64[::1], record_type(LimitRows)
-)
+LIMIT_ROWS = void(record_type(LimitSample), record_type(Frames), float64[::1], record_type(LimitRows))
 #: The signature of what computes the limited quantities: (sample, frames, numbers, u_dot, values), where the
 #: sample's `before` and `q_dot` are of its own inputs u; u_dot (m,) : their change from those before, per s.
-LIMIT_VALUES = types.void(
-    *(record_type(LimitSample), record_type(Frames), types.float64[::1], types.float64[::1]),
-    types.float64[::1],
+LIMIT_VALUES = void(
+    *(record_type(LimitSample), record_type(Frames), float64[::1], float64[::1]),
+    float64[::1],
 )
 
 call_limit_rows, call_limit_values = caller(LIMIT_ROWS), caller(LIMIT_VALUES)
