@@ -214,19 +214,27 @@ class Solid:
 
 
 def platform_shapes(robot: Robot, platform: Sequence[int]) -> list[Solid]:
-    """The shapes on the platform's joints, as a page draws them: of a root link without any a plate."""
-    model, names = robot.display_model, {robot.model.names[joint]: joint for joint in platform}
-    carried = [
-        (names[model.names[shape.parentJoint]], shape)
-        for shape in appearance(robot).shapes.geometryObjects
-        if model.names[shape.parentJoint] in names
-    ]
-    read_meshes([shape for _, shape in carried], robot.name)  # not the arm's, which is drawn as lines
-    outlines = ((joint, outline_points(shape.geometry), shape.placement) for joint, shape in carried)
+    """The visual shapes on the platform's joints, or else the collision shapes, or else what a page draws."""
+    names = {robot.model.names[joint]: joint for joint in platform}
+    visual, collision = robot.shapes
+
+    def carried(model: pin.Model, shapes: pin.GeometryModel) -> list[pin.GeometryObject]:
+        return [shape for shape in shapes.geometryObjects if model.names[shape.parentJoint] in names]
+
+    model, shapes = robot.display_model, carried(robot.display_model, visual)
+    if not shapes:
+        model, shapes = robot.model, carried(robot.model, collision)
+    if not shapes:
+        model, shapes = robot.display_model, carried(robot.display_model, appearance(robot).shapes)
+    read_meshes(shapes, robot.name)  # not the arm's, which is drawn as lines
+    outlines = ((shape, outline_points(shape.geometry)) for shape in shapes)
     return _outermost(
         [
-            Solid(joint, points @ np.array(place.rotation).T + np.array(place.translation))
-            for joint, points, place in outlines
+            Solid(
+                names[model.names[shape.parentJoint]],
+                points @ np.array(shape.placement.rotation).T + np.array(shape.placement.translation),
+            )
+            for shape, points in outlines
             if points is not None
         ]
     )
