@@ -45,7 +45,9 @@ class Swept(NamedTuple):
 
 def swept(scene: Scene, t: Array, q: Array, u: Array, places: Sequence[Sequence[Any]]) -> Swept:
     """Distances at t (N,), q (N, n), u (N, m), and between if needed; `places`: the obstacles', by sample."""
-    obstacles = tuple(as_passed(one, t, [at[i] for at in places]) for i, one in enumerate(scene.obstacles))
+    obstacles = tuple(
+        as_passed(obstacle, t, [at[i] for at in places]) for i, obstacle in enumerate(scene.obstacles)
+    )
     with scene.queries.among(obstacles):
         return _swept(scene, t, q, u, obstacles)
 

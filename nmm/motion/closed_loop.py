@@ -58,15 +58,15 @@ def drive_loop(
     except RunError as error:
         return Outcome.FAILED, (finding_in(error),)
     except KeyboardInterrupt:
-        found = Finding("interrupted", {"end": float(times[-1])}, {"t": recorder.reached})
-        return Outcome.INTERRUPTED, (found,)
+        finding = Finding("interrupted", {"end": float(times[-1])}, {"t": recorder.reached})
+        return Outcome.INTERRUPTED, (finding,)
     return Outcome.COMPLETED, ()
 
 
 def finding_in(error: RunError) -> Finding:
     """The finding that an error was raised with, or its sentence where there is no more."""
-    found = error.finding
-    return found if isinstance(found, Finding) else Finding("failed", {"text": str(error)})
+    finding = error.finding
+    return finding if isinstance(finding, Finding) else Finding("failed", {"text": str(error)})
 
 
 @dataclass
@@ -91,59 +91,59 @@ class _Loop:
 
     def __post_init__(self) -> None:
         solver = self.controller.solver
-        self.state, self.kept, self.renewals = solver.state, solver.sample, solver.program.renewals
+        self.state, self.sample_state, self.renewals = solver.state, solver.sample, solver.program.renewals
         self.advance = self.plant.under(self.controller)
 
     def run(self, q: Array, progress: Callable[[float], None] | None) -> None:
         recorder, times, steps = self.recorder, self.times, len(self.times) - 1
-        earlier = self.kept.snapshot()
+        earlier = self.sample_state.snapshot()
         sample = self._sample(0, q, -math.inf if self.leg is None else self.leg.earlier)
         recorder.add(sample)
-        k, there = 0, False
+        k, at_goal = 0, False
         a_share = steps if progress is None else max(1, steps // 100)
-        while k < steps and not there:
+        while k < steps and not at_goal:
             if progress is not None and k % a_share == 0:
                 progress(k / steps)
             reached, whole = self._pass_over(k, min(steps, (k // a_share + 1) * a_share))
             if reached > k:
                 recorder.passed_over(reached)
-                k, earlier = reached, self.kept.snapshot()
+                k, earlier = reached, self.sample_state.snapshot()
                 sample = self._sample(k, recorder.q[k].copy(), float(times[k - 1]))
                 recorder.replace_last(sample)
-                there = self._there(sample)
-            if not (whole or there or k == steps):
-                following, here = self._next(sample, k + 1, earlier)
+                at_goal = self._at_goal(sample)
+            if not (whole or at_goal or k == steps):
+                following, snapshot = self._next(sample, k + 1, earlier)
                 if following is None:
                     return
-                k, earlier, sample = k + 1, here, following
+                k, earlier, sample = k + 1, snapshot, following
                 recorder.add(sample)
-                there = self._there(sample)
+                at_goal = self._at_goal(sample)
         if progress is not None:
             progress(1.0)
 
-    def _there(self, sample: Step) -> bool:
+    def _at_goal(self, sample: Step) -> bool:
         return self.until is not None and self.until.reached(sample.error, self.controller.rows)
 
     def _pass_over(self, k: int, last: int) -> tuple[int, bool]:
         """The sample that compiled code reaches from sample k, at most an event's, and whether it is
         `last`."""
-        retreat_state, found = self.controller.solver.retreat_state, self.recorder.found
+        retreat_state, recorded = self.controller.solver.retreat_state, self.recorder.found
         if self.pass_over is None or (retreat_state is not None and retreat_state.now):
             return k, False
-        for one in self.renewals:
-            last = min(last, int(np.searchsorted(self.times, one.due)) - 1)
+        for source in self.renewals:
+            last = min(last, int(np.searchsorted(self.times, source.due)) - 1)
         if last <= k:
             return k, False
-        left = self.kept.snapshot()
-        reached, whole = self.pass_over(self.times, k, last, found)
-        for one in (*self.renewals, *(() if self.leg is None else (self.leg,))):
-            those = slice(k + 1, reached + 1)
-            stays = k + one.stays(self.times[those], self.plant.seen(those, found.q[those]))
+        left = self.sample_state.snapshot()
+        reached, whole = self.pass_over(self.times, k, last, recorded)
+        for source in (*self.renewals, *(() if self.leg is None else (self.leg,))):
+            passed = slice(k + 1, reached + 1)
+            stays = k + source.stays(self.times[passed], self.plant.seen(passed, recorded.q[passed]))
             if stays < reached:  # begin again, up to the sample before the event
                 whole, reached = False, stays
-                self.kept.restore(left)
+                self.sample_state.restore(left)
                 if stays > k:
-                    self.pass_over(self.times, k, stays, found)
+                    self.pass_over(self.times, k, stays, recorded)
         return reached, whole
 
     def _next(self, sample: Step, k: int, earlier: Snapshot) -> tuple[Step | None, Snapshot]:
@@ -151,60 +151,60 @@ class _Loop:
         if self.plant.disturbs:
             dt = float(self.times[k] - self.times[k - 1])
             q = self.plant.act(self.controller.solver, k - 1, sample.q, dt)
-            here = self.kept.snapshot()
-            return self._next_sample(k, q, sample.t), here
-        here = self.kept.snapshot()
-        stands, following, here = self._advanced(sample, k, here)
+            snapshot = self.sample_state.snapshot()
+            return self._next_sample(k, q, sample.t), snapshot
+        snapshot = self.sample_state.snapshot()
+        stands, following, snapshot = self._advanced(sample, k, snapshot)
         if not stands:
-            self.kept.restore(earlier)
+            self.sample_state.restore(earlier)
             self.state.reset()
             if self.controller.solver.second:
                 self.controller.solver.before[:] = sample.u
             sample = self._sample(k - 1, sample.q)
             self.recorder.replace_last(sample)
-            before, here = self.state.memory.copy(), self.kept.snapshot()
-            stands, following, here = self._advanced(sample, k, here)
+            before, snapshot = self.state.memory.copy(), self.sample_state.snapshot()
+            stands, following, snapshot = self._advanced(sample, k, snapshot)
             if not stands:
-                self.kept.restore(here)
+                self.sample_state.restore(snapshot)
                 q, held = self._integrated(sample, k)
-                here = self._hold(sample, held, here)
+                snapshot = self._hold(sample, held, snapshot)
                 following = self._next_sample(k, q, sample.t)
                 reserved = self.state.reservation(before, self.controller.robot.u_names, sample.t)
                 self.recorder.find_once(reserved)
-        return following, here
+        return following, snapshot
 
-    def _advanced(self, sample: Step, k: int, here: Snapshot) -> tuple[bool, Step | None, Snapshot]:
+    def _advanced(self, sample: Step, k: int, snapshot: Snapshot) -> tuple[bool, Step | None, Snapshot]:
         """Whether the step to sample k stands, that sample (None: another leg's), and the state before
-        it: `here` where the sample's own inputs are held."""
-        left, before = self.kept.snapshot(), self.state.memory.copy()
+        it: `snapshot` where the sample's own inputs are held."""
+        left, before = self.sample_state.snapshot(), self.state.memory.copy()
         try:
             with self.state.held():
                 q, held = self._integrated(sample, k)
         except SingularError:
             if self.state.may_stand(before):
                 raise
-            return False, None, here
+            return False, None, snapshot
         if not self.state.may_stand(before):
-            return False, None, here
-        self.kept.end_stages(left)
-        before_next = self._hold(sample, held, here)
+            return False, None, snapshot
+        self.sample_state.end_stages(left)
+        before_next = self._hold(sample, held, snapshot)
         following = self._next_sample(k, q, sample.t)
         stands = following is None or self.state.may_stand(before)
-        return stands, following, before_next if stands else here
+        return stands, following, before_next if stands else snapshot
 
-    def _hold(self, sample: Step, held: Array, here: Snapshot) -> Snapshot:
-        """The state `here` where the sample's own inputs are held, else that with those that are: they are
-        recorded, and accelerations count from them."""
+    def _hold(self, sample: Step, held: Array, snapshot: Snapshot) -> Snapshot:
+        """The state `snapshot` where the sample's own inputs are held, else that with those that are: they
+        are recorded, and accelerations count from them."""
         if held is sample.u:
-            return here
+            return snapshot
         self.recorder.hold(held)
-        now = self.kept.snapshot()
-        self.kept.restore(here)
+        now = self.sample_state.snapshot()
+        self.sample_state.restore(snapshot)
         self.controller.solver.count_from(held)
-        here = self.kept.snapshot()
-        self.kept.restore(now)
+        snapshot = self.sample_state.snapshot()
+        self.sample_state.restore(now)
         self.controller.solver.count_from(held)
-        return here
+        return snapshot
 
     def _next_sample(self, k: int, q: Array, earlier: float) -> Step | None:
         """Sample k; None if an event ends the leg there."""
@@ -223,14 +223,14 @@ class _Loop:
         controller, t, seen = self.controller, float(self.times[k]), self.plant.seen(k, q)
         _within_bound(q, "coordinates", t)
         if t - earlier < (controller.dt or math.nan) * (1.0 - 1e-9):
-            self.kept.elapsed = t - earlier
-        for one in self.renewals:
-            one.renew(t, seen, q)
+            self.sample_state.elapsed = t - earlier
+        for renewal in self.renewals:
+            renewal.renew(t, seen, q)
         controller.period_monitor.forget()  # compiled code has made those between
         try:
             controller(t, seen)
         finally:
-            self.kept.elapsed = None
+            self.sample_state.elapsed = None
         self.plant.observe(controller.solver, t, q)
         sample = controller.last(t, q)
         _within_bound(sample.u, "inputs", t)

@@ -219,8 +219,8 @@ class CompiledLoop:
         last = min(last, first + self._at_once)
         began = time.perf_counter()
         with self._controller.solver.compiled() as blocks:
-            given = self._method, times, first, last, self._partitioned, self._ends, self._choice
-            reached = self._fly(*blocks, *given, self._disturbed, found)
+            arguments = self._method, times, first, last, self._partitioned, self._ends, self._choice
+            reached = self._fly(*blocks, *arguments, self._disturbed, found)
         if reached == last:
             fitting = 0.8 * A_CALL * (last - first) / max(time.perf_counter() - began, 1e-9)
             self._at_once = max(self._at_once, min(int(fitting), MOST_TIMES * self._at_once))

@@ -57,8 +57,8 @@ class Disturbances:
         seed: int = 0,
     ) -> None:
         self.noise, self.slip = _numbers(noise, "noise"), _numbers(slip, "slip")
-        for one in self.noise.values() if isinstance(self.noise, dict) else [self.noise]:
-            expect(not np.any(np.asarray(one) < 0.0), "noise", "standard deviations, at least 0")
+        for deviation in self.noise.values() if isinstance(self.noise, dict) else [self.noise]:
+            expect(not np.any(np.asarray(deviation) < 0.0), "noise", "standard deviations, at least 0")
         self.delay, self.seed = counted(delay, "delay", 0), counted(seed, "seed", 0)
         self.creep, self.odometry = scalar(creep, "creep"), bool(odometry)
         self.correct = None if correct is None else positive(correct, "correct")
@@ -146,24 +146,24 @@ def check_disturbed(disturbed: Disturbed, method: str) -> None:
 
 def _numbers(value: ArrayLike | Mapping[str, float], what: str) -> Array | dict[str, float]:
     if isinstance(value, Mapping):
-        return {str(name): scalar(one, f"{what}: {name}") for name, one in value.items()}
+        return {str(name): scalar(number, f"{what}: {name}") for name, number in value.items()}
     try:
-        found = np.array(value, dtype=np.float64)
+        numbers = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
         raise InputError(where=what, expected="numbers, or some by name", got=value) from None
-    expect(np.all(np.isfinite(found)), what, "finite numbers")
-    return found
+    expect(np.all(np.isfinite(numbers)), what, "finite numbers")
+    return numbers
 
 
 def _each(
-    given: Array | dict[str, float], rest: float, names: Sequence[str], shape: tuple[int, ...], what: str
+    numbers: Array | dict[str, float], rest: float, names: Sequence[str], shape: tuple[int, ...], what: str
 ) -> Array:
     """The numbers for all names, (len(names),) or (B, len(names)); `rest` for those that are not given."""
-    if isinstance(given, dict):
-        for name in given:
+    if isinstance(numbers, dict):
+        for name in numbers:
             expect_known("name", name, names, what)
-        given = np.array([given.get(name, rest) for name in names])
+        numbers = np.array([numbers.get(name, rest) for name in names])
     try:
-        return np.broadcast_to(given, shape).copy()
+        return np.broadcast_to(numbers, shape).copy()
     except ValueError:
-        raise InputError(where=what, expected=f"a number or shape {shape}", got=given.tolist()) from None
+        raise InputError(where=what, expected=f"a number or shape {shape}", got=numbers.tolist()) from None

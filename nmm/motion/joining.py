@@ -31,17 +31,21 @@ def join(
     first = np.cumsum([0, *(len(task.rows(robot)) for task in stack)])
     record = joined_record(controller, schedule, legs)
     count = sum(map(len, parts))
-    arrays = {one.name: getattr(record, one.name) for one in saved() if one.shape in ("Ns", "Nl")}
+    arrays = {
+        quantity.name: getattr(record, quantity.name)
+        for quantity in saved()
+        if quantity.shape in ("Ns", "Nl")
+    }
     # What is of the run as a whole is worked out anew: distances, and what is drawn.
-    for one in saved():
-        if one.name not in arrays and one.shape.startswith("N") and not one.optional:
-            arrays[one.name] = np.concatenate([part[one.name] for part in parts])
+    for quantity in saved():
+        if quantity.name not in arrays and quantity.shape.startswith("N") and not quantity.optional:
+            arrays[quantity.name] = np.concatenate([part[quantity.name] for part in parts])
     t, q = arrays["t"], arrays["q"]
 
-    found: Swept | None = None
+    distances: Swept | None = None
     if controller.solver.scene is not None:
         where = [place for leg in legs for place in leg.recorder.places]
-        found = swept(controller.solver.scene, t, q, arrays["u"], where)
+        distances = swept(controller.solver.scene, t, q, arrays["u"], where)
     drawn = shown_frame(stack, robot)
     path = drawn.path(robot, q)
     desired = path if drawn.rows else None
@@ -76,9 +80,9 @@ def join(
         seen=seen.at(t, q),
         cameras=seen.cameras,
         events=tuple(sorted(dict.fromkeys(happened), key=lambda event: event.t)),
-        **({} if found is None else found.kept),
+        **({} if distances is None else distances.kept),
     )
-    return joined, found
+    return joined, distances
 
 
 def room_for(controller: Controller, count: int) -> Recorded:
@@ -95,9 +99,9 @@ def joined_record(controller: Controller, schedule: Schedule, legs: Sequence[Leg
     first = np.cumsum([0, *(len(task.rows(robot)) for task in stack)])
     whole, begin = room_for(controller, sum(len(leg.recorder) for leg in legs)), 0
     for leg in legs:
-        on, found = np.flatnonzero(leg.active), leg.recorder.so_far
-        here = begin + np.arange(len(leg.recorder))
-        begin += len(here)
+        on, recorded = np.flatnonzero(leg.active), leg.recorder.so_far
+        samples = begin + np.arange(len(leg.recorder))
+        begin += len(samples)
         places = sorted({stack.tasks[i].priority for i in on})
         columns = {
             "s": [k for i in on for k in range(first[i], first[i + 1])],
@@ -108,7 +112,7 @@ def joined_record(controller: Controller, schedule: Schedule, legs: Sequence[Leg
             sizes = zip(shape, values.shape[1:], strict=True)
             some = [np.array(columns.get(axis, range(size)), dtype=np.int64) for axis, size in sizes]
             own = tuple(slice(len(each)) for each in some)  # without a task, a leg has a row of its own
-            values[np.ix_(here, *some)] = getattr(found, name)[:, *own]
+            values[np.ix_(samples, *some)] = getattr(recorded, name)[:, *own]
     return whole
 
 
@@ -121,9 +125,9 @@ def row_names(robot: Robot, schedule: Schedule) -> tuple[str, ...]:
     return tuple(f"{task.name or i}: {row.name}" for i, task in enumerate(stack) for row in task.rows(robot))
 
 
-def _unmet(found: Sequence[Residuals], count: int) -> Residuals:
-    some = [one for one in found if one.samples]
+def _unmet(parts: Sequence[Residuals], count: int) -> Residuals:
+    some = [part for part in parts if part.samples]
     if not some:
         return NO_RESIDUALS
-    samples = sum(one.samples for one in some)
-    return max(some, key=lambda one: one.largest)._replace(samples=samples, share=samples / count)
+    samples = sum(part.samples for part in some)
+    return max(some, key=lambda part: part.largest)._replace(samples=samples, share=samples / count)

@@ -29,16 +29,16 @@ def shares(kept: LimitsOn, robot: Robot, q: Array, u: Array, rows: Array) -> tup
     x = [*u.T, *q[:, own].T]
     for row, values in zip(kept.row_limits, rows.T, strict=False):
         # Limits of coordinates without an input of their own are there already.
-        there = [ends for name, ends in zip(names, limits, strict=True) if name == row.name]
-        if not any(np.array_equal(row[2:], ends) for ends in there):
+        ranges = [ends for name, ends in zip(names, limits, strict=True) if name == row.name]
+        if not any(np.array_equal(row[2:], ends) for ends in ranges):
             names.append(row.name)
             sizes.append(kept.sizes.get(row.name, natural_size(row.unit, robot)))
             limits.append(np.array([row.lower, row.upper]))
             x.append(values)
     lower, upper = np.array(limits).T
     some = np.flatnonzero((np.isfinite(lower) | np.isfinite(upper)) & (upper > lower))
-    found = [_share(x[i], lower[i], upper[i], sizes[i]) for i in some]
-    return tuple(names[i] for i in some), np.array(found).reshape(len(some), len(q)).T
+    columns = [_share(x[i], lower[i], upper[i], sizes[i]) for i in some]
+    return tuple(names[i] for i in some), np.array(columns).reshape(len(some), len(q)).T
 
 
 def _share(x: Array, lower: float, upper: float, size: float) -> Array:

@@ -110,16 +110,16 @@ SMALL = 1e-2
 def rate_jumps(recorder: Recorder, *, follows: bool) -> Iterator[Finding]:
     """Where the rate that tasks ask for jumps, which inputs of second order follow with bounded
     accelerations; `follows`: other tasks were active before."""
-    found, t, k = recorder.so_far, recorder.t, float(recorder.controller.given.servo)
+    recorded, t, k = recorder.so_far, recorder.t, float(recorder.controller.given.servo)
     if not len(t):
         return
-    short = np.linalg.norm(found.rate - np.einsum("kij,kj->ki", found.J, found.u), axis=1)
-    least = SMALL * max(1.0, float(np.linalg.norm(found.rate, axis=1).max()))
+    short = np.linalg.norm(recorded.rate - np.einsum("kij,kj->ki", recorded.J, recorded.u), axis=1)
+    least = SMALL * max(1.0, float(np.linalg.norm(recorded.rate, axis=1).max()))
     where = []
     if follows and short[0] > least:
         where.append(0)
     if len(t) > 3:
-        size = np.linalg.norm(np.diff(found.rate, axis=0), axis=1)
+        size = np.linalg.norm(np.diff(recorded.rate, axis=0), axis=1)
         beside = np.maximum(np.append(size[1:], np.inf), np.append(np.inf, size[:-1]))
         where += (1 + np.flatnonzero((size > JUMP * beside) & (size > least))).tolist()
     if where:
@@ -138,7 +138,7 @@ def at_start(controller: Controller, q: Array, times: Array) -> Iterator[Finding
     robot, solver = controller.robot, controller.solver
     yield from provenance_of(robot).contradictions
     yield from slip_warnings(robot)
-    yield from (Finding("python_costs", {"text": one}) for one in solver.program.costs)
+    yield from (Finding("python_costs", {"text": cost}) for cost in solver.program.costs)
     angles = (i for i in robot.following.independent if robot.q_units[i] == "rad")
     if degrees := {robot.q_names[i]: float(q[i]) for i in angles if in_degrees(q[i])}:
         yield Finding("start_in_degrees", {"angles": degrees})

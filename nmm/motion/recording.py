@@ -50,7 +50,7 @@ class Recorder:
         self._shown = shown_frame(controller.task, controller.robot)
         self._seen = SeenPoints(controller.task, controller.limits, controller.robot)
         expect_memory(
-            COPIES * count * sum(one.nbytes for one in room(1, *sizes)),
+            COPIES * count * sum(array.nbytes for array in room(1, *sizes)),
             f"{count} samples need",
             "expected a larger dt or a shorter duration; nmm.rollout keeps every so many samples (every=)",
         )
@@ -156,49 +156,49 @@ class Recorder:
 
     def find_once(self, found: Finding | None) -> None:
         """Keep a finding, once a run."""
-        known = [(one.code, one.values) for one in self.findings]
+        known = [(finding.code, finding.values) for finding in self.findings]
         if found is not None and (found.code, found.values) not in known:
             self.findings.append(found)
 
     def noticed(self) -> list[Finding]:
         """What the numbers that the run replaced have noticed; once where two tasks have one camera."""
-        found: list[Finding] = []
-        for one in self.controller.solver.program.renewals:
-            found += (each for each in one.noticed(self.reached) if each not in found)
-        return found
+        findings: list[Finding] = []
+        for renewal in self.controller.solver.program.renewals:
+            findings += (finding for finding in renewal.noticed(self.reached) if finding not in findings)
+        return findings
 
     @property
     def _planned(self) -> Array | None:
         """Where the plan that it follows was at the samples, (N, n)."""
-        renewed = [one.planned(self.t) for one in self.controller.solver.program.renewals]
-        found = (*renewed, *(task.function.planned(self.t) for task in self.controller.task))
-        return next((one for one in found if one is not None), None)
+        renewed = [renewal.planned(self.t) for renewal in self.controller.solver.program.renewals]
+        plans = (*renewed, *(task.function.planned(self.t) for task in self.controller.task))
+        return next((plan for plan in plans if plan is not None), None)
 
     def trajectory(self, dt: float, method: str) -> Trajectory:
-        found, controller = self.so_far, self.controller
+        recorded, controller = self.so_far, self.controller
         robot, rows, scene = controller.robot, controller.rows, controller.solver.scene
-        self.singular_values = spectra(found.J, threads=1)
-        kept = controller.solver.limits_on if controller.limits is not None else Limits().on(robot)
+        self.singular_values = spectra(recorded.J, threads=1)
+        limits = controller.solver.limits_on if controller.limits is not None else Limits().on(robot)
         distances: dict[str, Any] = {}
         if scene is not None:
-            self.swept = swept(scene, self.t, found.q, found.u, self.places)
+            self.swept = swept(scene, self.t, recorded.q, recorded.u, self.places)
             names = tuple(" and ".join(pair) for pair in scene.names)
             distances = {**self.swept.kept, "clearance_names": names, "clearance_asked": scene.distance}
         compiled = len(self) > 0 and (self._compiled or controller.given.kinematics == COMPILED)
-        three = found.q[[0, len(self) // 2, -1]] if compiled else None
-        limited, within = shares(kept, robot, found.q, found.u, found.limited)
+        three = recorded.q[[0, len(self) // 2, -1]] if compiled else None
+        limited, within = shares(limits, robot, recorded.q, recorded.u, recorded.limited)
         moving = np.flatnonzero(~standing(robot, limited, within))
-        path = self._shown.path(robot, found.q)
+        path = self._shown.path(robot, recorded.q)
         desired, planned = None, self._planned
         if path is not None and self._shown.rows:
-            desired = self._shown.desired(path, found.r_d)
+            desired = self._shown.desired(path, recorded.r_d)
         elif path is not None and planned is not None:
             desired = self._shown.path(robot, planned)
         worked_out = {
             "t": self.t.copy(),
-            "u_dot": found.u_dot.copy() if controller.order == 2 else None,
+            "u_dot": recorded.u_dot.copy() if controller.order == 2 else None,
             "sigma_min": self.singular_values[:, -1],
-            "crossed": crossed(found.side),
+            "crossed": crossed(recorded.side),
             "margin": margin(within[:, moving]),
             "shares": within,
             "path": path,
@@ -206,25 +206,31 @@ class Recorder:
             "planned": planned,
             "believed": None if self.believed is None else self.believed[: len(self)].copy(),
             "target": self._shown.mark(path),
-            "seen": self._seen.at(self.t, found.q),
+            "seen": self._seen.at(self.t, recorded.q),
             **distances,
         }
-        those = [one for one in saved() if one.name not in worked_out]
-        noted = {one.name: getattr(found, one.name).copy() for one in those if one.noted}
-        record = Record(robot, {"t": self.t, **found._asdict()})
-        more = {one.name: one.of(record) for one in those if one.of is not None}
+        quantities = [quantity for quantity in saved() if quantity.name not in worked_out]
+        noted = {
+            quantity.name: getattr(recorded, quantity.name).copy()
+            for quantity in quantities
+            if quantity.noted
+        }
+        record = Record(robot, {"t": self.t, **recorded._asdict()})
+        more = {quantity.name: quantity.of(record) for quantity in quantities if quantity.of is not None}
         return Trajectory.of(
             noted | more | worked_out,
             robot=robot,
             limited=controller.limits is not None,
             limit_names=limited,
-            unmet=residuals(self.t, found.residual, found.rate),
+            unmet=residuals(self.t, recorded.residual, recorded.rate),
             r_names=tuple(row.name for row in rows),
             r_units=tuple(row.unit for row in rows),
             resolver=controller.resolver.name,
             method=method,
             dt=dt,
-            events=tuple(Event(*event) for one in controller.solver.program.renewals for event in one.events),
+            events=tuple(
+                Event(*event) for renewal in controller.solver.program.renewals for event in renewal.events
+            ),
             frame=self._shown.frame,
             cameras=self._seen.cameras,
             kinematics_off=np.nan if three is None else controller.solver.program.kinematics_off(three),
@@ -234,6 +240,6 @@ class Recorder:
 def crossed(side: Integers) -> Integers:
     """1 at the samples before which J_e was singular on the way, else 0; side (N,): the sign of det J_e, 0
     (unknown) where J_e was not inverted. An even number of singularities between samples goes unnoticed."""
-    found = np.zeros(len(side), dtype=np.int64)
-    found[1:] = side[1:] * side[:-1] < 0
-    return found
+    crossings = np.zeros(len(side), dtype=np.int64)
+    crossings[1:] = side[1:] * side[:-1] < 0
+    return crossings

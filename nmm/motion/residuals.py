@@ -53,13 +53,13 @@ def differs(residual: Array, rate: Array) -> Array:
 
 
 def residuals(t: Array, residual: Array, rate: Array) -> Residuals:
-    (found,) = np.nonzero(differs(residual, rate))
-    if not found.size:
+    (samples,) = np.nonzero(differs(residual, rate))
+    if not samples.size:
         return NO_RESIDUALS
-    k = int(found[np.argmax(residual[found])])
+    k = int(samples[np.argmax(residual[samples])])
     largest, asked = float(residual[k]), float(np.linalg.norm(rate[k]))
     relative = largest / asked if asked > 0.0 else 1.0
-    return Residuals(len(found), len(found) / len(t), largest, relative, float(t[k]))
+    return Residuals(len(samples), len(samples) / len(t), largest, relative, float(t[k]))
 
 
 def run_up(t: Array, u: Array, changes: Array, dt: float) -> int:

@@ -49,7 +49,7 @@ class RunCamera(NamedTuple):
     lines: tuple[tuple[int, int], ...] = ()
 
     def as_json(self) -> dict[str, Any]:
-        return {**self._asdict(), "goals": [one._asdict() for one in self.goals]}
+        return {**self._asdict(), "goals": [goal._asdict() for goal in self.goals]}
 
     def on(self, seen: Array, r_d: Array) -> Camera:
         """What it sees of `seen` (N, K, 3), m, with targets r_d (N, s) of the task."""
@@ -77,7 +77,7 @@ class SeenPoints:
     ) -> None:
         self._robot, self._live = robot, live
         self._functions: dict[object, Function] = {}
-        found: dict[str, RunCamera] = {}
+        cameras: dict[str, RunCamera] = {}
         first = 0
         for task in tasks:
             for camera, sight, points in self._sights(task.function):
@@ -86,20 +86,20 @@ class SeenPoints:
                     for k, (x, y) in enumerate(sight.rows)
                     if points[k] >= 0
                 ]
-                _add(found, camera, sight, points, goals)
+                _add(cameras, camera, sight, points, goals)
             first += len(task.rows(robot))
         edges: dict[str, list[Array]] = {}
         for bound in () if limits is None else limits.bounds:
             if isinstance(bound, Limit):
                 continue
             for camera, sight, points in self._sights(bound.function):
-                _add(found, camera, sight, points, [])
-                kept = np.array([[row.lower, row.upper] for row in bound.rows(robot)])
+                _add(cameras, camera, sight, points, [])
+                ranges = np.array([[row.lower, row.upper] for row in bound.rows(robot)])
                 fx, fy, cx, cy = sight.intrinsics
                 for x, y in sight.rows:
-                    ends = np.array([(kept[x] - cx) / fx, (kept[y] - cy) / fy])
+                    ends = np.array([(ranges[x] - cx) / fx, (ranges[y] - cy) / fy])
                     edges.setdefault(camera, []).append(ends)
-        self.cameras = tuple(_bordered(one, edges.get(one.frame, [])) for one in found.values())
+        self.cameras = tuple(_bordered(camera, edges.get(camera.frame, [])) for camera in cameras.values())
         self._program = Program(robot, list(self._functions.values()))
         self._program.lay_out()
         self.calls_python = self._program.calls_python
@@ -113,7 +113,7 @@ class SeenPoints:
         fits = all(row in range(count) for two in sight.rows for row in two)
         fits = fits and len(sight.rows) in (0, len(sight.points))
         expect(fits, f"{type(function).__name__}.shown", "two rows of its own for each point", sight.rows)
-        yield optical_frame(sight.camera, self._robot), sight, [self._number(one) for one in sight.points]
+        yield optical_frame(sight.camera, self._robot), sight, [self._number(point) for point in sight.points]
 
     def _number(self, point: Function) -> int:
         same = same_point(point, self._robot, self._live)
@@ -125,16 +125,16 @@ class SeenPoints:
     def by_camera(self, t: Array, q: Array, r_d: Array) -> tuple[Camera, ...]:
         """What each camera sees at times (N,), s, and q (N, n), with targets r_d (N, s) of the tasks."""
         seen = self.at(t, q)
-        return () if seen is None else tuple(one.on(seen, r_d) for one in self.cameras)
+        return () if seen is None else tuple(camera.on(seen, r_d) for camera in self.cameras)
 
     def at(self, t: Array, q: Array) -> Array | None:
         """Where they are at times (N,), s, and q (N, n): (N, K, 3), m, world axes; None without any."""
         if not self._functions:
             return None
-        found = np.empty((len(t), len(self._functions), 3))
-        for k, (time, here) in enumerate(zip(t.tolist(), q, strict=True)):
-            found[k] = [one.value for one in self._program.evaluate(time, here)]
-        return found
+        positions = np.empty((len(t), len(self._functions), 3))
+        for k, (time, q_k) in enumerate(zip(t.tolist(), q, strict=True)):
+            positions[k] = [point.value for point in self._program.evaluate(time, q_k)]
+        return positions
 
 
 def same_point(point: Function, robot: Robot, live: bool = False) -> object:
@@ -150,14 +150,14 @@ def same_point(point: Function, robot: Robot, live: bool = False) -> object:
 
 
 def _add(
-    found: dict[str, RunCamera], frame: str, sight: Sight, points: list[int], goals: list[GoalRows]
+    cameras: dict[str, RunCamera], frame: str, sight: Sight, points: list[int], goals: list[GoalRows]
 ) -> None:
     """Add to a frame's camera what a sight has: numbers of points of the run become those of the camera."""
-    before = found.get(frame, RunCamera(frame, ()))
+    before = cameras.get(frame, RunCamera(frame, ()))
     every = tuple(dict.fromkeys([*before.points, *(point for point in points if point >= 0)]))
     own = [goal._replace(point=every.index(goal.point)) for goal in goals]
     through = [(every.index(points[0]), every.index(points[1]))] if sight.line and min(points) >= 0 else []
-    found[frame] = before._replace(
+    cameras[frame] = before._replace(
         points=every,
         goals=(*before.goals, *own),
         intrinsics=sight.intrinsics if before.intrinsics == NORMALISED else before.intrinsics,

@@ -31,8 +31,8 @@ class ShownFrame(NamedTuple):
         """Where r_d (N, s) puts the frame, (N, 3) m; `path` along axes and at times without a task."""
         desired = path.copy()
         for axis, row in self.rows.items():
-            said = np.isfinite(r_d[:, row])
-            desired[said, axis] = r_d[said, row]
+            known = np.isfinite(r_d[:, row])
+            desired[known, axis] = r_d[known, row]
         return desired
 
     def mark(self, path: Array | None) -> Array | None:
@@ -51,27 +51,27 @@ def shown_frame(tasks: Iterable[Task], robot: Robot) -> ShownFrame:
     row = 0
     for task in tasks:
         count = len(task.rows(robot))
-        said = _said(task.function, robot, count)
-        if said.positions is not None and frame in (None, said.positions):
-            frame = said.positions
-            rows |= {AXES[axis]: row + i for axis, i in said.axes.items()}
-        turned = turned or said.turns
-        for part in (_said(task.reference, robot, count), said):
+        shown = _shown(task.function, robot, count)
+        if shown.positions is not None and frame in (None, shown.positions):
+            frame = shown.positions
+            rows |= {AXES[axis]: row + i for axis, i in shown.axes.items()}
+        turned = turned or shown.turns
+        for part in (_shown(task.reference, robot, count), shown):
             target = target if part.looks_at is None else np.array(part.looks_at, dtype=np.float64)
         row += count
     return ShownFrame(frame or turned, rows, target)
 
 
-def _said(function: Function, robot: Robot, rows: int) -> Shown:
+def _shown(function: Function, robot: Robot, rows: int) -> Shown:
     """What the function shows, validated before the run."""
-    said, name = function.shown(), f"{type(function).__name__}.shown"
-    for frame in (said.positions, said.turns):
+    shown, name = function.shown(), f"{type(function).__name__}.shown"
+    for frame in (shown.positions, shown.turns):
         if frame is not None:
             robot.frame_id(frame)
-    fits = all(axis in AXES and row in range(rows) for axis, row in said.axes.items())
-    expect(fits, name, f"axes from x, y, z with rows from 0 to {rows - 1}", dict(said.axes))
-    fits = len(said.rotation) in (0, 3) and all(row in range(rows) for row in said.rotation)
-    expect(fits, name, f"three rows from 0 to {rows - 1} as rotation, or none", said.rotation)
-    fits = said.looks_at is None or np.shape(said.looks_at) in ((2,), (3,))
-    expect(fits, name, "2 or 3 numbers as looks_at", said.looks_at)
-    return said
+    fits = all(axis in AXES and row in range(rows) for axis, row in shown.axes.items())
+    expect(fits, name, f"axes from x, y, z with rows from 0 to {rows - 1}", dict(shown.axes))
+    fits = len(shown.rotation) in (0, 3) and all(row in range(rows) for row in shown.rotation)
+    expect(fits, name, f"three rows from 0 to {rows - 1} as rotation, or none", shown.rotation)
+    fits = shown.looks_at is None or np.shape(shown.looks_at) in ((2,), (3,))
+    expect(fits, name, "2 or 3 numbers as looks_at", shown.looks_at)
+    return shown

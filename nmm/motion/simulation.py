@@ -106,9 +106,9 @@ def simulate(
     plant, schedule = Plant(advance, disturbed), controller.schedule
     if schedule is not None:
         legs = run_legs(controller, plant, times, q, progress, until, watch)
-        run, found = join(controller, schedule, legs, dt, method)
+        run, distances = join(controller, schedule, legs, dt, method)
         verdict = lazy_call("nmm.motion.diagnosis.diagnose:diagnose_legs")(
-            controller, schedule, legs, run, found, until
+            controller, schedule, legs, run, distances, until
         )
     else:
         recorder, ended = record_run(controller, plant, times, q, progress, until, None, watch)

@@ -53,9 +53,9 @@ def summary_rows(
     if (unmet := trajectory.unmet).samples:
         share = f"{unmet.samples} of {len(trajectory)} samples"
         yield "J u differs from the rate", f"in {share}, by {unmet.largest:.3g} at most"
-    for one in placed():
-        if one.line is not None and not np.all(trajectory[one.name] == one.fill):
-            yield one.line[0], one.line[1].format_map(numbers)
+    for quantity in placed():
+        if quantity.line is not None and not np.all(trajectory[quantity.name] == quantity.fill):
+            yield quantity.line[0], quantity.line[1].format_map(numbers)
     if trajectory.limited:
         share = numbers["scaled_share"]
         least = f"{numbers['scale_min']:.3g} at least; below 1 {100 * share:.3g} % of the time"
@@ -76,16 +76,16 @@ def summary_rows(
             for name, rate in fast.items()
         ]
         yield "wheels beyond their limits", ", ".join(rates)
-    motors = [one for one in numbers["findings"] if one["line"] == MOTORS]
-    if over := [one["values"] for one in motors if one["code"] == "effort_exceeded"]:
+    motors = [finding for finding in numbers["findings"] if finding["line"] == MOTORS]
+    if over := [finding["values"] for finding in motors if finding["code"] == "effort_exceeded"]:
         efforts = [
             "{0} {2} {1} (at most {3})".format(
-                one["actuator"], one["unit"], *apart(one["peak"], one["effort"], digits=3)
+                finding["actuator"], finding["unit"], *apart(finding["peak"], finding["effort"], digits=3)
             )
-            for one in over
+            for finding in over
         ]
         yield "motors beyond their limits", ", ".join(efforts)
-    yield from (("balance", one["text"]) for one in motors if one["code"] == "tips")
+    yield from (("balance", finding["text"]) for finding in motors if finding["code"] == "tips")
     if still := numbers.get("standing_at_limits"):
         yield "at a limit throughout", f"{', '.join(still)}; not counted above"
     if numbers.get("clearance_min") is not None:

@@ -153,13 +153,17 @@ class Trajectory:
 
     def __getitem__(self, name: str) -> Array:
         """A recorded quantity by its name (`nmm.control.step.quantities`); else `InputError`."""
-        expect_known("quantity", name, [one.name for one in QUANTITIES.values() if one.saved or one.of])
-        one, known = QUANTITIES[name], {**vars(self), **self.more}
+        expect_known(
+            "quantity",
+            name,
+            [quantity.name for quantity in QUANTITIES.values() if quantity.saved or quantity.of],
+        )
+        quantity, known = QUANTITIES[name], {**vars(self), **self.more}
         if name in known:
             return known[name]
-        if one.of is None:
-            return one.absent(N=len(self))
-        return one.of(Record(self.robot, {each: known[each] for each in QUANTITIES if each in known}))
+        if quantity.of is None:
+            return quantity.absent(N=len(self))
+        return quantity.of(Record(self.robot, {each: known[each] for each in QUANTITIES if each in known}))
 
     def __len__(self) -> int:
         return len(self.t)
@@ -186,12 +190,12 @@ class Trajectory:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What else is worth a warning, in words."""
-        return tuple(line(one) for one in self.verdict.warnings)
+        return tuple(line(findings) for findings in self.verdict.warnings)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What `message` and `warnings` say, as data (docs/api/findings.md lists the codes)."""
-        return (*self.verdict.reasons, *(one for many in self.verdict.warnings for one in many))
+        return (*self.verdict.reasons, *(finding for many in self.verdict.warnings for finding in many))
 
     @property
     def complete(self) -> bool:
@@ -302,10 +306,10 @@ class Trajectory:
         """What the motion asks of the motors, with masses carried, kg by frame (see `nmm.Dynamics`); what the
         scenario says is carried when not given."""
         payload = self.surroundings.payload if payload is None else payload
-        found: Torques = lazy_call("nmm.model.dynamics.torques:torques_along")(
+        torques: Torques = lazy_call("nmm.model.dynamics.torques:torques_along")(
             self.robot, self.t, self.q, self.u, payload, u_dot=self.u_dot
         )
-        return found
+        return torques
 
     def motion(self, label: str | None = None) -> Motion:
         """What playback shows of it."""
@@ -323,13 +327,16 @@ class Trajectory:
             label=self.called if label is None else label,
             frame=self.frame,
             bodies=tuple(
-                Body(one.name, one.shape.geometry(), obstacle_places(one, self.t)) for one in self.obstacles
+                Body(obstacle.name, obstacle.shape.geometry(), obstacle_places(obstacle, self.t))
+                for obstacle in self.obstacles
             ),
             nearest=Nearest(*near, self.clearance_names, self.clearance_asked)
             if len(self) and len(self.clearance_points) == len(self)
             else None,
             surroundings=self.surroundings,
-            cameras=() if self.seen is None else tuple(one.on(self.seen, self.r_d) for one in self.cameras),
+            cameras=()
+            if self.seen is None
+            else tuple(camera.on(self.seen, self.r_d) for camera in self.cameras),
         )
 
     def play(self, *, port: int | None = None, open_browser: bool = True, ellipsoids: Wanted = False) -> None:

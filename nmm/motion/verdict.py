@@ -46,12 +46,12 @@ class Verdict:
 
     def after(self, warnings: Sequence[Finding]) -> Verdict:
         """The same with other warnings first."""
-        return replace(self, warnings=(*((one,) for one in warnings), *self.warnings))
+        return replace(self, warnings=(*((finding,) for finding in warnings), *self.warnings))
 
     def as_json(self) -> list[dict[str, Any]]:
         """Each finding with the line of which it is a part: "message", or "warnings.0" and so on."""
         lines = {"message": self.reasons} | {f"warnings.{i}": line for i, line in enumerate(self.warnings)}
-        return [{**one.as_json(), "line": name} for name, line in lines.items() for one in line]
+        return [{**finding.as_json(), "line": name} for name, line in lines.items() for finding in line]
 
 
 #: Of a run that reached its end, with nothing to say of it.
@@ -64,24 +64,24 @@ def verdict_of(
     """The verdict in a run's folder, from its findings or, in older folders, its sentences."""
     lines: dict[str, FindingLine] = {}
     if findings is None:
-        told = {"message": message} | {f"warnings.{i}": text for i, text in enumerate(warnings)}
+        texts = {"message": message} | {f"warnings.{i}": text for i, text in enumerate(warnings)}
         findings = [
-            {"code": "said", "values": {"text": told[name]}, "line": name} for name in told if told[name]
+            {"code": "said", "values": {"text": texts[name]}, "line": name} for name in texts if texts[name]
         ]
-    for one in findings:
-        if one["line"] == MOTORS:  # found anew, from the motion
+    for finding in findings:
+        if finding["line"] == MOTORS:  # found anew, from the motion
             continue
-        lines[one["line"]] = (*lines.get(one["line"], ()), _finding_of(one))
+        lines[finding["line"]] = (*lines.get(finding["line"], ()), _finding_of(finding))
     return Verdict(outcome, lines.pop("message", ()), tuple(lines.values()))
 
 
-def _finding_of(told: Mapping[str, Any]) -> Finding:
+def _finding_of(saved: Mapping[str, Any]) -> Finding:
     """The finding, or its sentence if its code or values are another version's."""
-    found = Finding.from_json(told)
+    finding = Finding.from_json(saved)
     with suppress(LookupError, TypeError, ValueError, AttributeError, OverflowError):
-        if line([found]):
-            return found
-    return Finding("said", {"text": told["text"]})
+        if line([finding]):
+            return finding
+    return Finding("said", {"text": saved["text"]})
 
 
 class Awaited:
@@ -122,5 +122,5 @@ class Awaited:
 
     def __reduce__(self) -> tuple[Callable[..., Verdict], tuple[Any, ...]]:
         """Copies and pickles hold the verdict, as `find` holds a controller."""
-        found = self._found_out()
-        return Verdict, (found.outcome, found.reasons, found.warnings)
+        verdict = self._found_out()
+        return Verdict, (verdict.outcome, verdict.reasons, verdict.warnings)

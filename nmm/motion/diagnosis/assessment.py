@@ -135,14 +135,14 @@ def instabilities(
     # A mode of a few 1/s that the differences show as barely decaying is not what breaks a run.
     decays = -eigenvalues.real
     guilty = grows & (decays * dt > 1e-3) & (decays > 0.1 * np.abs(eigenvalues))
-    found, fractions = [], np.linspace(0.0, 1.0, 1001)[1:]
+    unstable, fractions = [], np.linspace(0.0, 1.0, 1001)[1:]
     for k in np.flatnonzero(guilty.any(axis=1)):
         modes = eigenvalues[k][guilty[k]]
         fastest = modes[np.argmin(modes.real)]
         stable = np.abs(np.polyval(stability[::-1], fastest * dt * fractions)) <= 1.0
         limit = fractions[np.argmin(stable) - 1] * dt if np.argmin(stable) else fractions[0] * dt
-        found.append(Instability(float(times[known[k]]), float(-fastest.real), float(limit)))
-    return found
+        unstable.append(Instability(float(times[known[k]]), float(-fastest.real), float(limit)))
+    return unstable
 
 
 class Assessment(NamedTuple):
@@ -173,12 +173,12 @@ def assess(
             steps = adaptive_errors(samples, recorder.so_far.q, advance.tolerance)
         else:
             steps = step_errors(samples, advance.order)
-        found, own = departure(samples, steps, goes_on=recorder.goes_on), 0
-        if found is not None:  # then it is worth the time to ask the target
+        departed, own = departure(samples, steps, goes_on=recorder.goes_on), 0
+        if departed is not None:  # then it is worth the time to ask the target
             moved = _target_moves(controller, samples, recorder.so_far.q)
-            found = departure(samples, steps, moved, goes_on=recorder.goes_on)
+            departed = departure(samples, steps, moved, goes_on=recorder.goes_on)
             own = _own_moves(samples, moved)
-        return Assessment(unstable, len(some), found, own)
+        return Assessment(unstable, len(some), departed, own)
 
 
 def _own_moves(samples: Samples, moved: Array) -> int:

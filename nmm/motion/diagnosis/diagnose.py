@@ -35,7 +35,7 @@ DECIDED = (Outcome.COMPLETED, Outcome.MISSED)
 
 
 def diagnose(leg: Leg, trajectory: Trajectory, until: Goal | None) -> Verdict | Awaited:
-    before, after = tuple((one,) for one in leg.recorder.findings), [*noticed(leg.recorder)]
+    before, after = tuple((finding,) for finding in leg.recorder.findings), [*noticed(leg.recorder)]
     into = _into(leg.controller, leg.recorder.swept, trajectory)
     held = tuple(binding(trajectory, leg.controller.solver.limits_on)) if trajectory.limited else ()
 
@@ -61,7 +61,7 @@ def diagnose_legs(
     """The verdict on a run of tasks that come and go: the first leg above its expected decay decides."""
     last = legs[-1]
     judged = [judge(leg, trajectory.dt, trajectory.method, until if leg is last else None) for leg in legs]
-    before = [tuple((one,) for one in leg.recorder.findings) for leg in legs]
+    before = [tuple((finding,) for finding in leg.recorder.findings) for leg in legs]
     after = [[*noticed(leg.recorder)] for leg in legs]
     moment = schedule.settle()
     never = tuple(schedule.sequence.never_began(moment))
@@ -70,29 +70,29 @@ def diagnose_legs(
 
     def finish(verdicts: Sequence[Verdict]) -> Verdict:
         of_legs = zip(places, legs, before, after, verdicts, strict=True)
-        told = told_once(
+        leg_warnings = told_once(
             [
-                (place, leg.recorder.start, (*first, *lines(then, one.outcome), *one.warnings))
-                for place, leg, first, then, one in of_legs
+                (place, leg.recorder.start, (*first, *lines(then, verdict.outcome), *verdict.warnings))
+                for place, leg, first, then, verdict in of_legs
             ]
         )
         verdict = verdicts[-1]
         if verdict.outcome in ENDED:
             missed = (
-                replace(one, reasons=_at(place, one.reasons))
-                for place, one in zip(places, verdicts, strict=True)
-                if one.outcome in (Outcome.MISSED, Outcome.UNSTABLE)
+                replace(verdict, reasons=_at(place, verdict.reasons))
+                for place, verdict in zip(places, verdicts, strict=True)
+                if verdict.outcome in (Outcome.MISSED, Outcome.UNSTABLE)
             )
             verdict = next(missed, verdict)
         ended, verdict = verdict.outcome in ENDED, replace(verdict, warnings=())
         if until is not None and ended and (never or not any(last.active)):
-            found = Finding("nothing_to_reach", {"never": [one.values["task"] for one in never]})
-            verdict = Verdict(Outcome.MISSED, (found, *never))
+            reason = Finding("nothing_to_reach", {"never": [finding.values["task"] for finding in never]})
+            verdict = Verdict(Outcome.MISSED, (reason, *never))
         elif ended:
             verdict = _reached(verdict, last, until)
         verdict = _collided(_blocked(verdict, last.recorder), into)
-        every = (*told, *verdict.warnings, *((found,) for found in never))
-        every = tuple(one for i, one in enumerate(every) if one not in every[:i])
+        every = (*leg_warnings, *verdict.warnings, *((finding,) for finding in never))
+        every = tuple(line for i, line in enumerate(every) if line not in every[:i])
         return _explained(replace(verdict, warnings=every))
 
     return _when_read(judged, finish)
@@ -100,33 +100,35 @@ def diagnose_legs(
 
 def _when_read(judged: Sequence[Judged], finish: Callable[[Sequence[Verdict]], Verdict]) -> Verdict | Awaited:
     """`finish` of the legs' verdicts; deferred if some need trials of another dt."""
-    if not any(one.trials for one in judged):
-        return finish([one.verdict(None) for one in judged])
-    known = None if any(one.open for one in judged) else finish([one.verdict(None) for one in judged]).outcome
+    if not any(leg.trials for leg in judged):
+        return finish([leg.verdict(None) for leg in judged])
+    known = None if any(leg.open for leg in judged) else finish([leg.verdict(None) for leg in judged]).outcome
     return Awaited(
-        lambda: finish([one.verdict(one.trials.advice() if one.trials else None) for one in judged]), known
+        lambda: finish([leg.verdict(leg.trials.advice() if leg.trials else None) for leg in judged]), known
     )
 
 
 def noticed(recorder: Recorder) -> Iterator[tuple[Finding, Collection[Outcome]]]:
     """Warnings independent of the error, once the trajectory is made, each with the outcomes that show it."""
-    controller, found, t = recorder.controller, recorder.so_far, recorder.t
+    controller, recorded, t = recorder.controller, recorder.so_far, recorder.t
     every, setting = tuple(Outcome), controller.solver.scene
-    yield from ((one, every) for one in not_kept(recorder, controller))
-    yield from ((one, {*every} - {Outcome.SINGULAR}) for one in _nearly_singular(recorder))
-    of_tasks = (one for task in controller.task for one in task.function.noticed(t, found.q))
-    yield from ((one, every) for one in of_tasks)
+    yield from ((finding, every) for finding in not_kept(recorder, controller))
+    yield from ((finding, {*every} - {Outcome.SINGULAR}) for finding in _nearly_singular(recorder))
+    of_tasks = (finding for task in controller.task for finding in task.function.noticed(t, recorded.q))
+    yield from ((finding, every) for finding in of_tasks)
     broken = (
-        *broken_limits(controller.robot, t, found.q, found.u),
-        *broken_rows(controller.solver.limits_on, t, found.limited),
+        *broken_limits(controller.robot, t, recorded.q, recorded.u),
+        *broken_rows(controller.solver.limits_on, t, recorded.limited),
     )
-    yield from ((one, (*DECIDED, Outcome.INTERRUPTED)) for one in broken)
+    yield from ((finding, (*DECIDED, Outcome.INTERRUPTED)) for finding in broken)
     if setting is not None and recorder.swept is not None:
-        yield from ((one, every) for one in distances_short(setting, recorder.swept, t, recorder.counts))
+        yield from (
+            (finding, every) for finding in distances_short(setting, recorder.swept, t, recorder.counts)
+        )
 
 
 def lines(found: Iterable[tuple[Finding, Collection[Outcome]]], outcome: Outcome) -> tuple[FindingLine, ...]:
-    return tuple((one,) for one, outcomes in found if outcome in outcomes)
+    return tuple((finding,) for finding, outcomes in found if outcome in outcomes)
 
 
 def _nearly_singular(recorder: Recorder) -> Iterator[Finding]:
@@ -140,10 +142,10 @@ def _nearly_singular(recorder: Recorder) -> Iterator[Finding]:
     ratio = np.divide(values[:, -1], largest, out=np.ones(len(largest)), where=largest > 0.0)
     k = int(np.argmin(ratio))
     if ratio[k] < NEARLY_SINGULAR:
-        found, t = recorder.so_far, float(recorder.t[k])
-        inputs = float(np.abs(found.u).max())
-        given = recorder.controller, t, found.q[k], found.J[k], float(ratio[k])
-        yield near_singularity("nearly_singular", *given, largest=inputs)
+        recorded, t = recorder.so_far, float(recorder.t[k])
+        inputs = float(np.abs(recorded.u).max())
+        at_sample = recorder.controller, t, recorded.q[k], recorded.J[k], float(ratio[k])
+        yield near_singularity("nearly_singular", *at_sample, largest=inputs)
 
 
 def _reached(verdict: Verdict, leg: Leg, goal: Goal | None) -> Verdict:
@@ -153,22 +155,22 @@ def _reached(verdict: Verdict, leg: Leg, goal: Goal | None) -> Verdict:
         return verdict
     error = recorder.so_far.error[-1]
     if goal.reached(error, rows):
-        said = (verdict.reasons,) if verdict.reasons else ()
-        found = Finding("reached", {}, {"t": recorder.reached})
-        return Verdict(Outcome.COMPLETED, (found,), (*said, *verdict.warnings))
+        earlier = (verdict.reasons,) if verdict.reasons else ()
+        reason = Finding("reached", {}, {"t": recorder.reached})
+        return Verdict(Outcome.COMPLETED, (reason,), (*earlier, *verdict.warnings))
     if verdict.outcome is Outcome.UNSTABLE:
         return verdict
     m, rad = error_sizes(error, rows)
-    found = Finding("not_reached", {"within": recorder.duration, "m": float(m), "rad": float(rad)})
-    return replace(verdict, outcome=Outcome.MISSED, reasons=(found, *verdict.reasons))
+    reason = Finding("not_reached", {"within": recorder.duration, "m": float(m), "rad": float(rad)})
+    return replace(verdict, outcome=Outcome.MISSED, reasons=(reason, *verdict.reasons))
 
 
 def _blocked(verdict: Verdict, recorder: Recorder) -> Verdict:
     """The verdict with the distances that held the robot back at the end of a run that missed its target."""
     if verdict.outcome is not Outcome.MISSED or not recorder.blocking:
         return verdict
-    found = Finding("blocked", {"pairs": list(recorder.blocking)})
-    return replace(verdict, reasons=(found, *verdict.reasons))
+    reason = Finding("blocked", {"pairs": list(recorder.blocking)})
+    return replace(verdict, reasons=(reason, *verdict.reasons))
 
 
 def _explained(verdict: Verdict) -> Verdict:
@@ -201,11 +203,11 @@ def _place(schedule: Schedule, leg: Leg) -> dict[str, object]:
     return {"tasks": names, "start": leg.recorder.start, "end": end}
 
 
-def _at(place: dict[str, object] | None, found: FindingLine) -> FindingLine:
+def _at(place: dict[str, object] | None, findings: FindingLine) -> FindingLine:
     """A leg's findings; those of the only leg have no place."""
     if place is None:
-        return found
-    return tuple(replace(one, where={**one.where, "leg": place}) for one in found)
+        return findings
+    return tuple(replace(finding, where={**finding.where, "leg": place}) for finding in findings)
 
 
 def told_once(
@@ -218,10 +220,10 @@ def told_once(
             first = warning[0]
             kind = first.code, first.values.get("name"), first.values.get("text")
             alike[kind].append((place, begins, warning))
-    told = []
-    for found in alike.values():
-        place, begins, warning = found[0]
-        others = list(dict.fromkeys(later for _, later, _ in found if later != begins))
-        whole = all(one == warning for *_, one in found) and len(others) + 1 == len(legs)
-        told.append(warning if whole or place is None else _at({**place, "also": others}, warning))
-    return told
+    merged = []
+    for occurrences in alike.values():
+        place, begins, warning = occurrences[0]
+        others = list(dict.fromkeys(later for _, later, _ in occurrences if later != begins))
+        whole = all(other == warning for *_, other in occurrences) and len(others) + 1 == len(legs)
+        merged.append(warning if whole or place is None else _at({**place, "also": others}, warning))
+    return merged

@@ -84,9 +84,9 @@ class Samples(NamedTuple):
     @classmethod
     def of(cls, recorder: Recorder) -> Samples:
         """The samples recorded so far, with the rate of bounded feedback."""
-        controller, found = recorder.controller, recorder.so_far
+        controller, recorded = recorder.controller, recorder.so_far
         feedback = Feedback(*gain_rows(controller.task, controller.robot))
-        error, rate, residual, J, u = found.error, found.rate, found.residual, found.J, found.u
+        error, rate, residual, J, u = recorded.error, recorded.rate, recorded.residual, recorded.J, recorded.u
         if feedback.has_bounds:
             full = rate
             rate = rate - error @ feedback.K.T + feedback.rates(error)
@@ -95,7 +95,7 @@ class Samples(NamedTuple):
             else:
                 residual = np.linalg.norm(np.einsum("kij,kj->ki", J, u) - rate, axis=1)
         servo = float(controller.given.servo) if controller.given.order == 2 else 0.0
-        return cls(recorder.t, error, rate, J, u, residual, found.partition, feedback, servo)
+        return cls(recorder.t, error, rate, J, u, residual, recorded.partition, feedback, servo)
 
     def lag(self) -> tuple[Array, Array]:
         """At order 2, what J u may lack of the rate at the samples, as y_dot = -k y has it, and what it
@@ -211,11 +211,11 @@ def _steps(t: Array) -> tuple[Array, Integers]:
 def step_errors(samples: Samples, order: int) -> Array:
     """The error that a method of that order may make along each step, (N - 1,); 0 for unresolved steps."""
     t, error, rate, J, u, _, partition, feedback, _ = samples
-    fed, K, found = feedback.rates(error), feedback.K, np.empty(len(t) - 1)
+    fed, K, errors = feedback.rates(error), feedback.K, np.empty(len(t) - 1)
     again = np.ascontiguousarray(fed @ K.T)  # K² e
     size = float(np.linalg.norm(K, 2))
-    write_step_errors(t, rate - fed, again, J, u, partition, size, order, found)
-    return found
+    write_step_errors(t, rate - fed, again, J, u, partition, size, order, errors)
+    return errors
 
 
 @kernel(
@@ -261,12 +261,12 @@ def write_step_errors(
 def changed(values: Array, k: int, size: int) -> tuple[float, float]:
     """‖v[k+1] - v[k]‖ of v (N, ...) with so many numbers a sample, and that beside the larger of both."""
     flat = view(values, k * size, (2 * size,))
-    one, other, both = 0.0, 0.0, 0.0
+    before, after, both = 0.0, 0.0, 0.0
     for i in range(size):
-        one += flat[i] * flat[i]
-        other += flat[size + i] * flat[size + i]
+        before += flat[i] * flat[i]
+        after += flat[size + i] * flat[size + i]
         both += (flat[size + i] - flat[i]) ** 2
-    larger, apart = math.sqrt(max(one, other)), math.sqrt(both)
+    larger, apart = math.sqrt(max(before, after)), math.sqrt(both)
     return apart, apart / larger if larger > 0.0 else apart
 
 

@@ -56,7 +56,7 @@ class Trials:
     """Trials of a run in steps of dt, s, with a copy of its controller. Nothing is tried if the errors differ
     from those recorded, as a target that is set, or what a function reads, may have changed since."""
 
-    def __init__(self, leg: Leg, dt: float, found: Assessment) -> None:
+    def __init__(self, leg: Leg, dt: float, assessment: Assessment) -> None:
         recorder = leg.recorder
         self._controller: Controller = copy.copy(leg.controller)
         self._integrator, self._dt, self._end = leg.integrator, dt, leg.end
@@ -65,10 +65,10 @@ class Trials:
         solver, own = leg.controller.solver, max(FEW_STEPS, PER_SAMPLE * len(self._t))
         compiled = solver.compiles_runs and solver.scene is None and not leg.integrator.tolerance
         self._steps = MOST_TRIALS * MOST_STEPS if compiled else own
-        self._unstable = found.unstable
-        troubles = [int(np.searchsorted(self._t, one.t)) for one in found.unstable]
-        if found.departure is not None:
-            troubles.append(found.departure.first)
+        self._unstable = assessment.unstable
+        troubles = [int(np.searchsorted(self._t, mode.t)) for mode in assessment.unstable]
+        if assessment.departure is not None:
+            troubles.append(assessment.departure.first)
         self._before = min(troubles, default=0)
 
     def advice(self) -> Advice | None:
@@ -80,15 +80,15 @@ class Trials:
         unstable = self._unstable
         for _ in range(MOST_TRIALS):
             # Where a run went astray its modes grow ever faster: the slowest of them is believed.
-            limit = max((one.limit for one in unstable), default=0.0)
+            limit = max((mode.limit for mode in unstable), default=0.0)
             dt = min(max(BELOW * limit, LEAST_SHARE * dt), most)
             steps = min(MOST_STEPS, left, int(self._duration / dt) + 1)
             left -= steps
             if steps * dt < min(self._duration, LEAST * self._dt):
                 return None
-            found, unstable = self._try(dt, steps)
-            if found is not None:
-                return found
+            advice, unstable = self._try(dt, steps)
+            if advice is not None:
+                return advice
             most = MOST_SHARE * dt
         return None
 
@@ -124,8 +124,8 @@ class Trials:
 
 
 def passed(recorder: Recorder) -> Finding | None:
-    robot, found = recorder.controller.robot, recorder.so_far
-    return crossings(recorder.t, found.u, found.side, found.J, robot.u_names, robot.u_units)
+    robot, recorded = recorder.controller.robot, recorder.so_far
+    return crossings(recorder.t, recorded.u, recorded.side, recorded.J, robot.u_names, robot.u_units)
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ class Judged:
     """What was seen of a leg that ended, with outcome and reasons of its integration.
 
     lost : what nothing moves, at a singular end
-    found : the assessment, if it was made
+    assessment : the assessment, if it was made
     left : the finding that the error exceeds its expected decay
     seen : possible causes
     moved : the finding that the target moved otherwise than its rate says, though the error decayed
@@ -144,7 +144,7 @@ class Judged:
     reasons: FindingLine
     warnings: tuple[FindingLine, ...] = ()
     lost: FindingLine = ()
-    found: Assessment | None = None
+    assessment: Assessment | None = None
     left: FindingLine = ()
     seen: FindingLine = ()
     moved: FindingLine = ()
@@ -154,41 +154,45 @@ class Judged:
 
     @property
     def open(self) -> bool:
-        undecided = self.found is not None and self.found.missed and bool(self.found.unstable)
+        undecided = self.assessment is not None and self.assessment.missed and bool(self.assessment.unstable)
         return self.trials is not None and self.outcome is Outcome.COMPLETED and undecided
 
     def verdict(self, advice: Advice | None) -> Verdict:
         """The verdict, given a dt with which the run behaves, or None if none was found."""
-        found, seen, warnings = self.found, self.seen, self.warnings
-        if found is None:
+        assessment, seen, warnings = self.assessment, self.seen, self.warnings
+        if assessment is None:
             return Verdict(self.outcome, (*self.reasons, *self.lost), warnings)
-        unstable = self._unstable(found, advice)
+        unstable = self._unstable(assessment, advice)
         tried = (Finding("shorter_dt", {"shorter": advice.dt, "dt": self.dt}),) if advice else ()
         if self.outcome is not Outcome.COMPLETED:
             why = (unstable or tried) if advice else (*self.lost, *seen)
             return Verdict(self.outcome, (*self.reasons, *why), warnings)
-        if found.missed:
+        if assessment.missed:
             if unstable and advice:
                 return Verdict(Outcome.UNSTABLE, (*unstable, *seen), warnings)
             # What is read first is short: what chatters, or follows from a target out of reach, comes apart.
-            far = any(one.code == HOPELESS for one in seen)
-            also = tuple(one for one in seen if one.code == "chattering" or (far and one != seen[0]))
-            why = tuple(one for one in seen if one not in also)
+            far = any(finding.code == HOPELESS for finding in seen)
+            also = tuple(
+                finding for finding in seen if finding.code == "chattering" or (far and finding != seen[0])
+            )
+            why = tuple(finding for finding in seen if finding not in also)
             return Verdict(Outcome.MISSED, (*self.left, *why, *tried), (*warnings, *([also] if also else [])))
-        if 2 * len(found.unstable) > found.examined:
+        if 2 * len(assessment.unstable) > assessment.examined:
             return Verdict(Outcome.UNSTABLE, unstable, warnings)
-        if any(one.code == "extended_jacobian_crossed" and "name" in one.values for one in seen):
+        if any(finding.code == "extended_jacobian_crossed" and "name" in finding.values for finding in seen):
             return Verdict(Outcome.MISSED, (*self.left, *seen), warnings)  # inputs jumped over it
-        more = [(*self.left, *seen)] if self.left else [(one,) for one in (*seen, *self.moved)]
-        part = tuple(Finding(one.code, {**one.values, "part": True}, one.where) for one in unstable)
+        more = [(*self.left, *seen)] if self.left else [(finding,) for finding in (*seen, *self.moved)]
+        part = tuple(
+            Finding(finding.code, {**finding.values, "part": True}, finding.where) for finding in unstable
+        )
         return Verdict(self.outcome, self.reasons, (*warnings, *more, *([part] if part else [])))
 
-    def _unstable(self, found: Assessment, advice: Advice | None) -> FindingLine:
-        if not found.unstable:
+    def _unstable(self, assessment: Assessment, advice: Advice | None) -> FindingLine:
+        if not assessment.unstable:
             return ()
         # Of a run that went astray the last modes are monstrous: the one that the advice answers is told.
-        answered = [one for one in found.unstable if advice is not None and one.limit >= advice.dt]
-        mode = max(answered or found.unstable, key=lambda one: one.rate)
+        answered = [mode for mode in assessment.unstable if advice is not None and mode.limit >= advice.dt]
+        mode = max(answered or assessment.unstable, key=lambda mode: mode.rate)
         tried = {} if advice is None else {"tried": advice._asdict()}
         values = {"rate": mode.rate, "method": self.method, "dt": self.dt, "part": False, **tried}
         return (Finding("dt_too_long", values, {"t": mode.t}),)
@@ -212,30 +216,34 @@ def _judged(leg: Leg, dt: float, method: str, goal: Goal | None) -> Judged:
     if not len(recorder):
         return Judged(outcome, ended, lost=lost)
     samples = Samples.of(recorder)
-    warnings = tuple((one,) for one in _unmet(controller, recorder, samples, dt))
+    warnings = tuple((finding,) for finding in _unmet(controller, recorder, samples, dt))
     if outcome is Outcome.INTERRUPTED or recorder.disturbed:  # no decay is expected of a disturbed robot
         return Judged(outcome, ended, warnings, lost)
-    there = goal is not None and goal.reached(samples.error[-1], controller.rows)
-    found = assess(controller, recorder, leg.integrator, dt, held=not there)
-    left = found.departure
-    measured = any(one.jumps for one in controller.solver.program.renewals)
-    moved = (Finding("target_jumps", {"steps": found.target}),) if found.target and not measured else ()
+    at_goal = goal is not None and goal.reached(samples.error[-1], controller.rows)
+    assessment = assess(controller, recorder, leg.integrator, dt, held=not at_goal)
+    left = assessment.departure
+    measured = any(renewal.jumps for renewal in controller.solver.program.renewals)
+    moved = (
+        (Finding("target_jumps", {"steps": assessment.target}),) if assessment.target and not measured else ()
+    )
     why = *_seen(controller, recorder, samples, left), *(moved if left else ()), passed(recorder)
-    seen = tuple(one for one in why if one is not None)
-    troubled = bool(found.unstable) or found.missed or outcome is Outcome.DIVERGED
+    seen = tuple(finding for finding in why if finding is not None)
+    troubled = bool(assessment.unstable) or assessment.missed or outcome is Outcome.DIVERGED
     # A task that distances hold back departs from its decay with any dt, and to try costs many runs.
     held_back = bool(recorder.blocking) or recorder.avoided
-    hopeless = outcome is Outcome.SINGULAR or any(one.code == HOPELESS for one in seen)
+    hopeless = outcome is Outcome.SINGULAR or any(finding.code == HOPELESS for finding in seen)
     return Judged(
         outcome,
         ended,
         warnings,
         lost,
-        found,
+        assessment,
         left=() if left is None else (_above_decay(samples, left),),
         seen=seen,
         moved=() if left else moved,
-        trials=Trials(leg, dt, found) if troubled and not (hopeless or held_back or samples.servo) else None,
+        trials=Trials(leg, dt, assessment)
+        if troubled and not (hopeless or held_back or samples.servo)
+        else None,
         method=method,
         dt=dt,
     )
@@ -248,37 +256,38 @@ def _unmet(controller: Controller, recorder: Recorder, samples: Samples, dt: flo
         residual[: run_up(samples.t, samples.u, controller.solver.limits_on.changes, dt)] = 0.0
     unmet = residuals(samples.t, residual, samples.rate)
     if unmet.samples:
-        there = {"limits": controller.limits, "distances": controller.solver.scene}
-        kept = [name for name, one in there.items() if one is not None]
+        constraints = {"limits": controller.limits, "distances": controller.solver.scene}
+        names = [name for name, constraint in constraints.items() if constraint is not None]
         more = {"rows": len(controller.rows), "inputs": controller.robot.n_u}
         if more["rows"] <= more["inputs"] or len(controller.task.levels(controller.robot)) > 1:
             more = {}
-        yield unmet.finding(scale=float(recorder.so_far.scale.min(initial=1.0)), kept=kept, **more)
+        yield unmet.finding(scale=float(recorder.so_far.scale.min(initial=1.0)), kept=names, **more)
     if recorder.disturbed:
         return
-    robot, found = controller.robot, recorder.so_far
-    otherwise = moving_otherwise(samples.t, found.q, found.q_dot, robot.q_names, robot.q_units)
+    robot, recorded = controller.robot, recorder.so_far
+    otherwise = moving_otherwise(samples.t, recorded.q, recorded.q_dot, robot.q_names, robot.q_units)
     if otherwise is not None:
         yield otherwise
-    sliding = sideways_speeds(robot, found.q, found.q_dot)
+    sliding = sideways_speeds(robot, recorded.q, recorded.q_dot)
     if sliding:
         fastest = max(sliding, key=lambda name: sliding[name][1])
         speeds = {name: speed for name, (_, speed) in sliding.items()}
         yield Finding("wheels_slid", {"speeds": speeds}, {"t": float(samples.t[sliding[fastest][0]])})
 
 
-def _above_decay(samples: Samples, found: Departure) -> Finding:
-    """What was expected and found: at the worst, and at the end if the error is above it there."""
+def _above_decay(samples: Samples, departure: Departure) -> Finding:
+    """The error and its bound: at the worst, and at the end if the error is above the bound there."""
     norm = np.linalg.norm(samples.error, axis=1)
     last = len(norm) - 1
-    missed = norm[last] > found.bound[last]
-    stays = missed and f"{norm[last]:.3g}" == f"{norm[found.worst]:.3g}"
-    told = [last] if stays or found.worst == last else [found.worst, *([last] if missed else [])]
+    missed = norm[last] > departure.bound[last]
+    stays = missed and f"{norm[last]:.3g}" == f"{norm[departure.worst]:.3g}"
+    reported = [last] if stays or departure.worst == last else [departure.worst, *([last] if missed else [])]
     errors = [
-        {"t": float(samples.t[k]), "error": float(norm[k]), "promised": float(found.bound[k])} for k in told
+        {"t": float(samples.t[k]), "error": float(norm[k]), "promised": float(departure.bound[k])}
+        for k in reported
     ]
     values = {"initial": float(norm[0]), "errors": errors, "end": float(samples.t[last])}
-    return Finding("promise_left", values, {"t": float(samples.t[found.first])})
+    return Finding("promise_left", values, {"t": float(samples.t[departure.first])})
 
 
 def _seen(
@@ -309,7 +318,7 @@ def _lost(leg: Leg) -> Iterator[Finding]:
     if ended.outcome is not Outcome.SINGULAR:
         return
     lost = reasons.lost_words(controller, ended.q, ended.J)
-    if lost and not any(lost[0] in one.values.get("lost", ()) for one in ended.reasons):
+    if lost and not any(lost[0] in reason.values.get("lost", ()) for reason in ended.reasons):
         yield Finding("nothing_gives", {"lost": lost})
     if len(recorder):
         far = reasons.out_of_reach(controller, ended.q, recorder.so_far.r_d[-1])

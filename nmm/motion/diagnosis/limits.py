@@ -100,7 +100,7 @@ def binding(trajectory: Trajectory, kept: LimitsOn) -> Iterator[Finding]:
 
 def not_kept(recorder: Recorder, controller: Controller) -> Iterator[Finding]:
     """Contradictory limits, retreats, an added task not done, a resolver without an answer."""
-    times, found = recorder.t, recorder.so_far
+    times, recorded = recorder.t, recorder.so_far
     units = controller.solver.limits_on.rate_units
     for name in dict.fromkeys(name for beyond in recorder.beyond.values() for name in beyond):
         broken = {k: beyond[name] for k, beyond in recorder.beyond.items() if name in beyond}
@@ -115,19 +115,19 @@ def not_kept(recorder: Recorder, controller: Controller) -> Iterator[Finding]:
     backed_off = times[np.diff(recorder.retreats[: len(times)], prepend=recorder.backed_off) > 0]
     if len(backed_off):
         yield Finding("backed_off", {"times": backed_off.tolist()})
-    missed = times[found.added_residual > 0.0]
+    missed = times[recorded.added_residual > 0.0]
     if len(missed):
         values = {
             "samples": len(missed),
             "end": float(missed[-1]),
             "again": bool(missed[-1] < recorder.reached),
-            "largest": float(found.added_residual.max()),
+            "largest": float(recorded.added_residual.max()),
             "unit": _of_rates(row.unit for row in controller.given.added_task.rows(controller.robot)),
         }
         yield Finding("added_task_missed", values, {"t": float(missed[0])})
-    unanswered = times[found.unanswered > 0]
+    unanswered = times[recorded.unanswered > 0]
     if len(unanswered):
-        singular = recorder.singular_values[found.unanswered > 0]
+        singular = recorder.singular_values[recorded.unanswered > 0]
         lost = bool(np.any(singular[:, -1] <= LOST * singular[:, 0]))
         values = {"samples": len(unanswered), "lost_rank": lost}
         yield Finding("no_answer", values, {"t": float(unanswered[0])})
@@ -143,15 +143,16 @@ def distances_short(setting: Scene, found: Swept, t: Array, counts: Counts) -> I
     if not len(t):
         return
     asked = setting.distance
-    (kept,) = np.nonzero(found.clearance >= asked - ROUNDING)
-    first = int(kept[0]) if kept.size else len(t)
+    (clear,) = np.nonzero(found.clearance >= asked - ROUNDING)
+    first = int(clear[0]) if clear.size else len(t)
     if first > 0:
         values = {
             "distance": asked,
             "name": setting.words(int(found.pairs[0])),
-            "own": setting.names[int(found.pairs[0])][1] not in {one.name for one in setting.obstacles},
+            "own": setting.names[int(found.pairs[0])][1]
+            not in {obstacle.name for obstacle in setting.obstacles},
             "clearance": float(found.clearance[0]),
-            "back": float(t[first]) if kept.size else None,
+            "back": float(t[first]) if clear.size else None,
         }
         yield Finding("start_too_near", values, {"t": float(t[0])})
     short = np.flatnonzero(found.between[first:] < asked - ROUNDING) + first
