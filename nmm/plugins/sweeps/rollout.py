@@ -56,8 +56,8 @@ class Rollouts:
     --------
     >>> scenario = nmm.Scenario.load("unicycle_2r_position")
     >>> starts = scenario.robot().q(scenario.parts.q0) + np.zeros((3, 1))
-    >>> found = nmm.rollout(scenario, starts, duration=2.0, dt=0.01, keep=["q"], every=10)
-    >>> found["q"].shape, found.outcome
+    >>> runs = nmm.rollout(scenario, starts, duration=2.0, dt=0.01, keep=["q"], every=10)
+    >>> runs["q"].shape, runs.outcome
     ((3, 21, 5), ('ended', 'ended', 'ended'))
     """
 
@@ -73,10 +73,10 @@ class Rollouts:
         return len(self.outcome)
 
     def __getitem__(self, name: str) -> Array:
-        found = self.kept.get(name, self.measures.get(name))
-        if found is None:
+        values = self.kept.get(name, self.measures.get(name))
+        if values is None:
             raise no_such("quantity", name, [*self.kept, *self.measures], "rollout")
-        return found
+        return values
 
 
 def rollout(
@@ -122,8 +122,8 @@ def rollout(
     --------
     >>> scenario = nmm.Scenario.load("unicycle_2r_position")
     >>> starts = scenario.robot().q(scenario.parts.q0) + np.linspace(-0.2, 0.2, 5)[:, None]
-    >>> found = nmm.rollout(scenario, starts, duration=5.0, dt=0.01)
-    >>> found["error_final"].shape, set(found.outcome)
+    >>> runs = nmm.rollout(scenario, starts, duration=5.0, dt=0.01)
+    >>> runs["error_final"].shape, set(runs.outcome)
     ((5,), {'ended'})
     """
     if beside:
@@ -162,16 +162,16 @@ def rollout(
     where = None if folder is None else Path(folder)
     every = counted(every, "every")
     Recorder(controllers[0], times)  # `InputError` where there is no memory for one
-    kept = Kept(keep, times, every, count, room_for(controllers[0], len(times)), where)
-    runs = _Runs(controllers, starts, times, method, until, disturbing, kept)
+    store = Kept(keep, times, every, count, room_for(controllers[0], len(times)), where)
+    runs = _Runs(controllers, starts, times, method, until, disturbing, store)
     workers = min(counted(cores() if threads is None else threads, "threads"), count)
     rooms: dict[str, Array] = {}
     with ThreadPoolExecutor(workers) as pool:
-        for begin in range(0, count, kept.part):
-            end = min(count, begin + kept.part)
-            rooms = kept.room(end - begin)
+        for begin in range(0, count, store.part):
+            end = min(count, begin + store.part)
+            rooms = store.room(end - begin)
             try:
-                waiting = [pool.submit(runs.one, i, rooms, i - begin) for i in range(begin, end)]
+                waiting = [pool.submit(runs.run, i, rooms, i - begin) for i in range(begin, end)]
                 for k, future in enumerate(waiting, start=begin + 1):
                     future.result()
                     if progress is not None:
@@ -179,15 +179,15 @@ def rollout(
             except BaseException:
                 runs.stop.set()
                 raise
-            kept.write(begin, rooms)
+            store.write(begin, rooms)
     return Rollouts(
-        t=kept.t,
+        t=store.t,
         kept={} if folder is not None else rooms,
         measures=dict(zip(MEASURES, runs.measures.T.copy(), strict=True)),
         outcome=tuple(runs.outcome),
         message=tuple(runs.message),
         samples=runs.samples,
-        files=tuple(kept.files),
+        files=tuple(store.files),
     )
 
 
@@ -201,7 +201,7 @@ class _Runs:
     method: str
     until: Goal | None
     disturbing: Disturbing
-    kept: Kept
+    store: Kept
 
     def __post_init__(self) -> None:
         self._local, self.stop = threading.local(), threading.Event()
@@ -210,7 +210,7 @@ class _Runs:
         self.samples: Integers = np.zeros(count, dtype=np.int64)
         self.outcome, self.message = [""] * count, [""] * count
 
-    def one(self, i: int, kept: dict[str, Array], row: int) -> None:
+    def run(self, i: int, rooms: dict[str, Array], row: int) -> None:
         if self.stop.is_set():
             return
         controller, recorder, advance = self._controller(i)
@@ -218,40 +218,46 @@ class _Runs:
         start, schedule = self.starts[i].copy(), controller.schedule
         if schedule is None:
             outcome, why = drive_loop(controller, plant, recorder, self.times, start, until=self.until)
-            found, reached, why = recorder.found, _at_goal(recorder, self.until), (*why, *recorder.noticed())
+            recorded, reached, why = (
+                recorder.found,
+                _at_goal(recorder, self.until),
+                (*why, *recorder.noticed()),
+            )
         else:
             legs = run_legs(controller, plant, self.times, start, None, self.until)
             recorder = legs[-1].recorder
             outcome, why, *_ = legs[-1].ended
-            why = (*why, *(one for leg in legs for one in leg.recorder.noticed()))
-            found = joined_record(controller, schedule, legs)
+            why = (*why, *(finding for leg in legs for finding in leg.recorder.noticed()))
+            recorded = joined_record(controller, schedule, legs)
             waits = schedule.sequence.waiting(schedule.settle()) or not any(legs[-1].active)
             reached = not waits and _at_goal(recorder, self.until)
-        count = len(recorder) if schedule is None else len(found.q)
+        count = len(recorder) if schedule is None else len(recorded.q)
         believed = plant.disturbed.believed if len(plant.disturbed.believed) else None
-        self.kept.put(kept, row, found, believed, count)
-        self._measure(i, found, believed, count, [] if schedule is None else [leg.recorder for leg in legs])
+        self.store.put(rooms, row, recorded, believed, count)
+        self._measure(
+            i, recorded, believed, count, [] if schedule is None else [leg.recorder for leg in legs]
+        )
         self.samples[i] = count
         ended = "ended" if self.until is None else "reached" if reached else "missed"
         self.outcome[i] = ended if outcome is Outcome.COMPLETED else str(outcome)
         self.message[i] = line(why)
 
     def _measure(
-        self, i: int, found: Recorded, believed: Array | None, count: int, legs: Sequence[Recorder]
+        self, i: int, recorded: Recorded, believed: Array | None, count: int, legs: Sequence[Recorder]
     ) -> None:
         """The measures of run i; `legs` where tasks come and go, whose rows count while they are active."""
         if legs:
             known = {"error": 0.0, "scale": 1.0, "J": 0.0, "residual": 0.0}
-            filled = {name: np.nan_to_num(getattr(found, name), nan=x) for name, x in known.items()}
-            found = found._replace(**filled)
-        measure(self.times, count, found, self.measures[i])
+            filled = {name: np.nan_to_num(getattr(recorded, name), nan=x) for name, x in known.items()}
+            recorded = recorded._replace(**filled)
+        measure(self.times, count, recorded, self.measures[i])
         if legs:
             each, sigma_min = np.zeros((len(legs), len(MEASURES))), MEASURES.index("sigma_min")
             for own, leg in zip(each, legs, strict=True):
                 measure(leg.t, len(leg), leg.found, own)
             self.measures[i, sigma_min] = np.nanmin(each[:, sigma_min], initial=np.inf)
         if count:
-            away = np.zeros(2) if believed is None else (believed[count - 1] - found.q[count - 1])[:2]
+            away = np.zeros(2) if believed is None else (believed[count - 1] - recorded.q[count - 1])[:2]
             self.measures[i, MEASURES.index("drift")] = np.hypot(*away)
 
     def _controller(self, i: int) -> tuple[Controller, Recorder, Integrator]:
@@ -270,12 +276,15 @@ class _Runs:
 
 def _check(controllers: Sequence[Controller]) -> None:
     """`InputError` for controllers whose runs cannot stand beside each other."""
-    made = controllers and all(isinstance(one, Controller) for one in controllers)
+    made = controllers and all(isinstance(controller, Controller) for controller in controllers)
     expect(made, "rollout", "a controller, a scenario or a list of controllers")
     first = controllers[0]
-    for k, one in enumerate(controllers):
-        same = one.robot.q_names == first.robot.q_names and one.robot.u_names == first.robot.u_names
-        rows = len(one.given.task.rows(one.robot)) == len(first.given.task.rows(first.robot))
+    for k, controller in enumerate(controllers):
+        same = (
+            controller.robot.q_names == first.robot.q_names
+            and controller.robot.u_names == first.robot.u_names
+        )
+        rows = len(controller.given.task.rows(controller.robot)) == len(first.given.task.rows(first.robot))
         if not (same and rows):
             raise InputError("another robot or other rows than the first", where=f"rollout: controller {k}")
 
@@ -291,25 +300,25 @@ def checked_starts(controllers: Sequence[Controller], q0: Start) -> Array:
     """Starts (B, n), for one controller or for each of several; `InputError` names the run."""
     robot = controllers[0].robot
     if isinstance(q0, Mapping):
-        found = robot.q(q0)[np.newaxis]
-    elif isinstance(q0, Sequence) and any(isinstance(one, Mapping) for one in q0):
-        found = np.array([robot.q(one) for one in q0])
+        starts = robot.q(q0)[np.newaxis]
+    elif isinstance(q0, Sequence) and any(isinstance(start, Mapping) for start in q0):
+        starts = np.array([robot.q(start) for start in q0])
     else:
-        found = np.array(q0, dtype=np.float64)
-        found = found[np.newaxis] if found.ndim == 1 else found
-    fits = found.ndim == 2 and found.shape[1] == robot.n and len(found)
-    expect(fits, "q0", f"at least one run, (B, {robot.n}) or ({robot.n},)", found)
+        starts = np.array(q0, dtype=np.float64)
+        starts = starts[np.newaxis] if starts.ndim == 1 else starts
+    fits = starts.ndim == 2 and starts.shape[1] == robot.n and len(starts)
+    expect(fits, "q0", f"at least one run, (B, {robot.n}) or ({robot.n},)", starts)
     if len(controllers) > 1:
-        fits = len(found) in (1, len(controllers))
-        expect(fits, "q0", f"1 or {len(controllers)} starts, one a controller", len(found))
-        found = np.broadcast_to(found, (len(controllers), robot.n)).copy()
-    for k, q in enumerate(found):
-        one = controllers[k if len(controllers) > 1 else 0]
-        come_back = one.limits is not None and one.limits.position is not False
+        fits = len(starts) in (1, len(controllers))
+        expect(fits, "q0", f"1 or {len(controllers)} starts, one a controller", len(starts))
+        starts = np.broadcast_to(starts, (len(controllers), robot.n)).copy()
+    for k, q in enumerate(starts):
+        controller = controllers[k if len(controllers) > 1 else 0]
+        come_back = controller.limits is not None and controller.limits.position is not False
         try:
             robot.check_limits(robot.q(q), come_back=come_back)
         except InputError as error:
             raise error.at(f"run {k}") from None
-        if one.solver.scene is not None:
-            one.solver.scene.check_start(0.0, q)
-    return robot.following.placed(found)
+        if controller.solver.scene is not None:
+            controller.solver.scene.check_start(0.0, q)
+    return robot.following.placed(starts)
