@@ -63,10 +63,10 @@ def parameters(made: type) -> tuple[Parameter, ...]:
     """What the constructor takes, in order."""
     texts = documented(made)
     hints = get_type_hints(made.__init__)  # type: ignore[misc]  # of this very class
-    found = []
-    for name, given in inspect.signature(made).parameters.items():
-        starred = given.kind is inspect.Parameter.VAR_POSITIONAL
-        default, annotation = given.default, given.annotation
+    arguments = []
+    for name, parameter in inspect.signature(made).parameters.items():
+        starred = parameter.kind is inspect.Parameter.VAR_POSITIONAL
+        default, annotation = parameter.default, parameter.annotation
         if starred:
             with suppress(TypeError, ValueError):  # none may be given
                 made()
@@ -74,10 +74,10 @@ def parameters(made: type) -> tuple[Parameter, ...]:
         # As the source says it, also of a file that does not postpone the evaluation.
         written = annotation.__name__ if isinstance(annotation, type) else str(annotation)
         key, text = STARRED if starred else name, texts.get(name, "")
-        found.append(
+        arguments.append(
             Parameter(name, key, written.removesuffix(" | None"), hints[name], default, text, starred)
         )
-    return tuple(found)
+    return tuple(arguments)
 
 
 def documented(made: type) -> dict[str, str]:
@@ -178,9 +178,9 @@ class MadePart(Part):
                 continue
             value = _argument(getattr(self, parameter.key), parameter.key)
             if isinstance(value, dict):
-                value = {name: _argument(one, parameter.key, name) for name, one in value.items()}
+                value = {name: _argument(item, parameter.key, name) for name, item in value.items()}
             elif isinstance(value, list):
-                value = [_argument(one, parameter.key, str(k)) for k, one in enumerate(value)]
+                value = [_argument(item, parameter.key, str(k)) for k, item in enumerate(value)]
             if parameter.starred:
                 listed += value or ()
             else:

@@ -12,7 +12,7 @@ class DisturbancesPart(keys_of(Disturbances, MadePart, noise=NumbersByName, slip
     makes = Disturbances
 
     def build(self, robot: Robot, dt: float) -> Disturbances:
-        found: Disturbances = self.make()
+        disturbances: Disturbances = self.make()
         with self.own_keys():
-            found.on(robot, dt)
-        return found
+            disturbances.on(robot, dt)
+        return disturbances

@@ -41,9 +41,9 @@ class PolynomialPart(FunctionPart):
 
     def make(self, unit: str = "m") -> Function:
         forms = ("coefficients", "duration", "times", "points")
-        given = {name for name in forms if getattr(self, name) is not None}
-        if given not in ({"coefficients", "duration"}, {"times", "points"}):
-            raise InputError(expected="coefficients and duration, or times and points", got=sorted(given))
+        keys = {name for name in forms if getattr(self, name) is not None}
+        if keys not in ({"coefficients", "duration"}, {"times", "points"}):
+            raise InputError(expected="coefficients and duration, or times and points", got=sorted(keys))
         with self.own_keys():
             if self.times is not None and self.points is not None:
                 return Polynomial.through(self.times, self.points, self.unit or unit)
@@ -68,9 +68,9 @@ class RotationPart(FunctionPart):
     def rotation_vector(self) -> Array:
         """The rotation vector (3,), rad."""
         names = ("rpy", "quaternion", "vector")
-        given = [name for name in names if getattr(self, name) is not None]
-        if len(given) != 1:
-            raise InputError(expected=f"one of {', '.join(names)}", got=given)
+        keys = [name for name in names if getattr(self, name) is not None]
+        if len(keys) != 1:
+            raise InputError(expected=f"one of {', '.join(names)}", got=keys)
         with self.own_keys():
             if self.vector is not None:
                 return vector(self.vector, 3, "vector")
@@ -94,8 +94,8 @@ def checked_orientation(value: Any) -> Any:
     for key, item in value.items():
         with at(str(key)):
             expect_known("key", key, sizes)
-            given = numbers(item)
-        if len(given) != sizes[key]:
+            values = numbers(item)
+        if len(values) != sizes[key]:
             raise KeyedError((key,), expected=f"{sizes[key]} numbers", got=item)
     return {"kind": "rotation", **value}
 

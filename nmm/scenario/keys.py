@@ -59,11 +59,11 @@ def at(*place: str | int) -> Iterator[None]:
 
 def each(parts: Iterable[P], make: Callable[[P], T], *place: str | int) -> list[T]:
     """What is made of each part of the list at this place; errors know which one."""
-    found = []
+    made = []
     for i, part in enumerate(parts):
         with at(*place, i):
-            found.append(make(part))
-    return found
+            made.append(make(part))
+    return made
 
 
 class Part(BaseModel):
@@ -137,8 +137,8 @@ class OneOf:
             raise InputError(expected="a mapping (key: value)", got=value)
         if "kind" not in value:
             for key in value:
-                if said := Part.without_blank(str(key), ("kind",)):
-                    raise KeyedError((str(key),), f"unknown key {quoted(key)}{said}")
+                if hint := Part.without_blank(str(key), ("kind",)):
+                    raise KeyedError((str(key),), f"unknown key {quoted(key)}{hint}")
             raise KeyedError(("kind",), "this key is missing", available=self.parts)
         kind = value["kind"]
         if not isinstance(kind, str) or kind not in self.parts:

@@ -133,7 +133,7 @@ OBJECTIVE_PARTS: dict[str, type[ObjectivePart]] = OBJECTIVES.made(
 #: One objective, a list that is added up, or nothing.
 ObjectiveList = Annotated[
     list[Annotated[ObjectivePart, OneOf(OBJECTIVE_PARTS)]],
-    BeforeValidator(lambda given: [] if given is None else listed(given)),
+    BeforeValidator(lambda value: [] if value is None else listed(value)),
 ]
 
 

@@ -83,17 +83,17 @@ def _kinds(
     where: str, parts: Mapping[str, type[Part]], called: Mapping[str, str] = MappingProxyType({})
 ) -> Iterator[Section]:
     """The kinds of a part, one by one; keys that all of them have stand once, before."""
-    found = []
+    sections = []
     for kind, part in parts.items():
         words = called.get(kind, "")
         section = _section(
             f"{where}, kind: {kind}", part, f"{words[0].upper()}{words[1:]}. " if words else ""
         )
-        found.append(section)
-    shared = [key for key in found[0].keys if all(key in section.keys for section in found)]
+        sections.append(section)
+    shared = [key for key in sections[0].keys if all(key in section.keys for section in sections)]
     if shared:
         yield Section(f"{where}, of any kind", "Beside the kind's own keys.", shared)
-    for section in found:
+    for section in sections:
         yield section._replace(keys=[key for key in section.keys if key not in shared])
 
 
@@ -111,8 +111,8 @@ def _section(title: str, part: type[Part], called: str = "") -> Section:
 def _in_yaml(text: str) -> str:
     """A parameter's description as a key's: YAML's words, and kinds in place of their classes."""
     text = re.sub(r"\b(\w+)=(True|False)\b", r"\1: \2", text)
-    text = re.sub(r"\b(None|True|False)\b", lambda found: YAML[found[1]], text)
-    return re.sub(r"`(\w+)`", lambda found: f"`{_kinds_of_classes().get(found[1], found[1])}`", text)
+    text = re.sub(r"\b(None|True|False)\b", lambda match: YAML[match[1]], text)
+    return re.sub(r"`(\w+)`", lambda match: f"`{_kinds_of_classes().get(match[1], match[1])}`", text)
 
 
 @cache

@@ -218,7 +218,7 @@ class Scenario:
 
         parts = self.parts
         if parts.moved_by:
-            return self._told(self._motion(parts.moved_by, progress).trajectory(parts.dt))
+            return self._with_scenario(self._motion(parts.moved_by, progress).trajectory(parts.dt))
         with self._located():
             if controller is None:
                 controller = self.controller()
@@ -237,13 +237,13 @@ class Scenario:
                     watch=watch,
                     disturbances=None if parts.disturbances is None else parts.disturbances.make(),
                 )
-        return self._told(trajectory)
+        return self._with_scenario(trajectory)
 
-    def _told(self, trajectory: Trajectory) -> Trajectory:
+    def _with_scenario(self, trajectory: Trajectory) -> Trajectory:
         """A run with the scenario that it came from."""
         from nmm.scenario.sections import findings_of
 
-        warnings = [Finding("setting_parted", {"text": one}) for one in self.warnings]
+        warnings = [Finding("setting_parted", {"text": text}) for text in self.warnings]
         for key, section in self.parts.sections().items():
             warnings += findings_of(key, section, trajectory)
         return trajectory.with_scenario(self.resolved(), warnings, self.surroundings(self.robot()))

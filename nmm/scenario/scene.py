@@ -24,10 +24,10 @@ def _camera(value: object) -> object:
     if isinstance(value, str):
         expect_known("side", value, SIDES)
         return value
-    found = numbers(value)
-    if len(found) != 6:
+    values = numbers(value)
+    if len(values) != 6:
         raise InputError(expected=f"{', '.join(SIDES)}, or six numbers", got=value)
-    return found
+    return values
 
 
 class DrawnPart(Part):
@@ -44,8 +44,8 @@ class DrawnPart(Part):
         """Its name, its shape, Coal's, and where that is, (4, 4) m."""
         with at("shape"):
             shape = self.shape.build()
-        there = Obstacle(shape, [*self.xyz, *rotation_vector(rpy=self.rpy)], name=self.name)
-        return there.name, shape.geometry(), there.placement(0.0)
+        obstacle = Obstacle(shape, [*self.xyz, *rotation_vector(rpy=self.rpy)], name=self.name)
+        return obstacle.name, shape.geometry(), obstacle.placement(0.0)
 
 
 class CarriedPart(DrawnPart):

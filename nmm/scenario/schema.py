@@ -177,7 +177,7 @@ class ScenarioPart(Part):
         with at("resolver"):
             resolver = own or self.resolver.make()
         with at("task"):
-            sequenced = any(one.when for one in task)
+            sequenced = any(item.when for item in task)
             if sequenced:
                 Sequence(Stack.of(task), robot)
             levels = Stack.of(task).levels(robot)
@@ -244,8 +244,8 @@ class ScenarioPart(Part):
     def _check_added(self, robot: Robot, rows: int, redundancy: int, held: int) -> None:
         if rows in (redundancy, redundancy - held):
             return
-        given = isinstance(self.resolver, WithAddedTask) and self.resolver.added_task is not None
-        what = "" if given else f"the objective has {rows} quadratic terms"
+        explicit = isinstance(self.resolver, WithAddedTask) and self.resolver.added_task is not None
+        what = "" if explicit else f"the objective has {rows} quadratic terms"
         own = robot.following.independent.tolist()
         arm = [*own[robot.platform.n_p :], *own[: robot.platform.n_p][::-1]][:redundancy]
         q = robot.q(self.q0)

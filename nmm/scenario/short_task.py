@@ -75,9 +75,9 @@ def _from_words(text: str, robot: Robot) -> dict[str, Any]:
         needed = ", ".join([f"kind: {kind}", *framed, *shown])
         raise InputError(where=f"task {text}", expected=f"a mapping, as in {{{needed}}}")
     data: dict[str, Any] = {"kind": kind}
-    given = words.pop(0) if words and ("frame" in keys or not words[0]) else ""
+    frame = words.pop(0) if words and ("frame" in keys or not words[0]) else ""
     if "frame" in keys:
-        data["frame"] = given or _tip(robot, text)
+        data["frame"] = frame or _tip(robot, text)
         expect_known("frame", data["frame"], robot.frames, f"task {text}")
     axes = words.pop(0) if words else ""
     if words or (axes and "axes" not in keys):
@@ -89,8 +89,8 @@ def _from_words(text: str, robot: Robot) -> dict[str, Any]:
 
 def _tip(robot: Robot, text: str) -> str:
     """The end of the arm; of several branches (a head, a tray) that of the one with the most joints."""
-    found = [(len(branch), arm_end(robot, branch[-1])) for branch in arm_branches(robot)]
-    ends = sorted(((count, end) for count, end in found if end), key=lambda one: -one[0])
+    tips = [(len(branch), arm_end(robot, branch[-1])) for branch in arm_branches(robot)]
+    ends = sorted(((count, end) for count, end in tips if end), key=lambda pair: -pair[0])
     if not ends or (len(ends) > 1 and ends[0][0] == ends[1][0]):
         names = [f"{end} ({counted(count, 'joint')})" for count, end in ends[:4]]
         what = f"arms end at {listed(names)}" if ends else ""
@@ -106,6 +106,8 @@ def moving_axes(data: Mapping[str, Any], robot: Robot) -> str:
     rng = np.random.default_rng(0)
     moved = np.zeros(3)
     for _ in range(4):
-        here = Configuration(robot, robot.following.placed(rng.uniform(lower, upper)))
-        moved = np.maximum(moved, np.abs(evaluate(function, 0.0, here).value_q @ here.S).max(axis=1))
+        configuration = Configuration(robot, robot.following.placed(rng.uniform(lower, upper)))
+        moved = np.maximum(
+            moved, np.abs(evaluate(function, 0.0, configuration).value_q @ configuration.S).max(axis=1)
+        )
     return "".join(axis for axis, motion in zip("xyz", moved, strict=True) if motion > 1e-9) or "xyz"

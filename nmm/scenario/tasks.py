@@ -23,9 +23,9 @@ class ConditionPart(Part):
 
     def build(self, robot: Robot) -> Condition:
         """The condition; errors know their key."""
-        given = self.given()
+        values = self.given()
         with self.own_keys():
-            return self.makes(**{key: value for key, value in given.items() if key != "kind"})
+            return self.makes(**{key: value for key, value in values.items() if key != "kind"})
 
 
 class BetweenPart(ConditionPart):

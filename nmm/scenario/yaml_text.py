@@ -52,32 +52,32 @@ def read_text(text: str, name: str, *, lines: bool = True) -> Plain:
 
 def _fault(error: yaml.MarkedYAMLError, text: str) -> str:
     """What is wrong, in the words of one who writes the file; the parser's own where it is no usual slip."""
-    said, mark, since = str(error.problem or error.context), error.problem_mark, error.context_mark
+    problem, mark, since = str(error.problem or error.context), error.problem_mark, error.context_mark
     if mark is None:
-        return said
-    if "cannot start any token" in said:
-        begin = said.split("'")[1]
+        return problem
+    if "cannot start any token" in problem:
+        begin = problem.split("'")[1]
         return (
             "a tab: indent with spaces" if begin == "\\t" else f"text that begins with {begin} needs quotes"
         )
     if since is not None and "quoted scalar" in str(error.context):
         return f"the quote of line {since.line + 1} is not closed"
-    if since is not None and (closing := re.match(r"expected ',' or '([]}])'", said)):
+    if since is not None and (closing := re.match(r"expected ',' or '([]}])'", problem)):
         return f"a comma or {closing[1]} is missing behind what line {since.line + 1} opens"
     lines = text.splitlines()
-    if since is not None and "expected ':'" in said:
+    if since is not None and "expected ':'" in problem:
         return f"no colon behind {quoted(lines[since.line].strip())} in line {since.line + 1}"
     key = _KEY.match(lines[mark.line]) if mark.line < len(lines) else None
     if key is None:
-        return said
-    if said.startswith("mapping values") and mark.column > key.end(1):
+        return problem
+    if problem.startswith("mapping values") and mark.column > key.end(1):
         return "a second colon in one line: text with a colon and a blank needs quotes"
     before = next((line for line in reversed(lines[: mark.line]) if line.strip()), ":")
-    if said.startswith("mapping values") and ":" not in before:
+    if problem.startswith("mapping values") and ":" not in before:
         return f"no colon behind {quoted(before.strip())} in a line before"
-    above = next((found for line in reversed(lines[: mark.line]) if (found := _KEY.match(line))), None)
+    above = next((match for line in reversed(lines[: mark.line]) if (match := _KEY.match(line))), None)
     if above is None or above.start(1) == key.start(1):
-        return said
+        return problem
     return (
         f"{quoted(key[1])} begins in column {key.start(1) + 1}, {quoted(above[1])} above it in column "
         f"{above.start(1) + 1}: keys of one mapping begin in the same column"

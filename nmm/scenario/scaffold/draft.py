@@ -91,11 +91,11 @@ def first_scenario(
             raise InputError(expected="a robot's name or path", got=value)
     place = usual_file(arm or robot) if file is None else Path(file)
     chosen = chosen_robot(str(robot), place.parent, arm=None if arm is None else str(arm), at=at, **loading)
-    found, standing = hands(chosen.robot), Standing(chosen.robot)
+    candidates, standing = hands(chosen.robot), Standing(chosen.robot)
     last: NmmError = InputError("there is no frame that its inputs move")
     best, best_tips = cast(Draft | None, None), False
     tries = 0
-    for hand in found[:_HANDS] if found and found[0].joints else found:
+    for hand in candidates[:_HANDS] if candidates and candidates[0].joints else candidates:
         start = start_for(chosen.robot, hand, standing) if tries < _TRIES else None
         if start is None:
             continue
@@ -117,7 +117,7 @@ def first_scenario(
         if best is not None:
             return best
     what = f"no first scenario found that runs: {one_line(str(last))}"
-    expected = "" if found and found[0].joints else "--arm FILE, an arm to mount on it"
+    expected = "" if candidates and candidates[0].joints else "--arm FILE, an arm to mount on it"
     raise InputError(what, where=chosen.robot.name, expected=expected) from last
 
 
@@ -249,5 +249,7 @@ def _tried(
 def _unhurried(trajectory: Trajectory) -> bool:
     """Whether a run was nowhere slowed down by limits, nor warned of but for what any run would be."""
     notes = trajectory.robot.notes
-    unusual = [one for one in trajectory.findings if one.code != "idle_inputs" and one not in notes]
+    unusual = [
+        finding for finding in trajectory.findings if finding.code != "idle_inputs" and finding not in notes
+    ]
     return bool((trajectory.scale >= _UNHURRIED).all() and not unusual)

@@ -41,7 +41,7 @@ class Hand:
 def hands(robot: Robot) -> list[Hand]:
     """Frames to lead, the best first: ends of arms, or of a robot without any what its platform carries."""
     n_p = robot.platform.n_p
-    found, free = [], movable(robot)
+    ends, free = [], movable(robot)
     rolling = wheel_frames(robot)
     for chain in arm_branches(robot):
         frame = arm_end(robot, chain[-1])
@@ -51,11 +51,11 @@ def hands(robot: Robot) -> list[Hand]:
         if frame and joints:
             length = reach(robot, frame)
             far = length.length if length is not None and np.isfinite(length.length) else 0.0
-            found.append((-len(joints), -far, frame, joints))
-    found.sort()
+            ends.append((-len(joints), -far, frame, joints))
+    ends.sort()
     made = []
-    for less, nearer, frame, joints in found:
-        others = [other for _, _, other, _ in found if other != frame]
+    for less, nearer, frame, joints in ends:
+        others = [other for _, _, other, _ in ends if other != frame]
         beside = f"; other ends: {', '.join(others[:4])}" if others else ""
         why = f"the end of the longest chain: {counted(-less, 'joint')}, {-nearer:.2g} m long{beside}"
         made.append(Hand(frame, joints, why))
@@ -72,14 +72,14 @@ def hands(robot: Robot) -> list[Hand]:
 def wheel_frames(robot: Robot) -> set[str]:
     """Frames of wheels, of what steers them, and of what is between these and the base, held or not."""
     parts = {str(name) for note in robot.notes for name in _held_by(note)}
-    model, found = robot.model, set[str]()
+    model, names = robot.model, set[str]()
     for frame in model.frames:  # each behind the one that carries it
         above = model.frames[frame.parentFrame]
-        below = above.name in found and above.parentJoint == frame.parentJoint
+        below = above.name in names and above.parentJoint == frame.parentJoint
         own = {frame.name, str(model.names[frame.parentJoint])}
         if below or own & parts or any(word in " ".join(own).lower() for word in _ROLLING):
-            found.add(frame.name)
-    return found
+            names.add(frame.name)
+    return names
 
 
 def _held_by(note: Finding) -> Iterable[str]:

@@ -47,15 +47,15 @@ def chosen_robot(
     source and arm are bundled names, paths or package://PACKAGE/PATH; paths become relative to the scenario's
     folder where they lie below it; `at` is the frame that carries the arm; keys are a robot's others
     (platform, lock, ...)."""
-    given = {key: value for key, value in keys.items() if value not in (None, {}, [], ())}
+    options = {key: value for key, value in keys.items() if value not in (None, {}, [], ())}
     expect(at is None or arm is not None, "at", "an arm, whose place on the robot it is")
     if arm is not None:
-        own = {key: value for key, value in given.items() if key in (*_ARMS, "package_dirs")}
-        base = {key: value for key, value in given.items() if key not in _ARMS}
+        own = {key: value for key, value in options.items() if key in (*_ARMS, "package_dirs")}
+        base = {key: value for key, value in options.items() if key not in _ARMS}
         data = _mounted(_part(source, folder, base), _part(arm, folder, own), at)
         robot, data = _loaded(data, folder)
         return Chosen(robot, data, f"{robot.platform.name}, {_origin(robot)}")
-    robot, data = _loaded(_part(source, folder, given), folder)
+    robot, data = _loaded(_part(source, folder, options), folder)
     if provenance_of(robot).platform != "default" or not any(
         note.code == "no_wheels" for note in robot.notes
     ):
@@ -87,7 +87,7 @@ def _part(source: str, folder: Path, keys: Mapping[str, Any]) -> dict[str, Any]:
     if "srdf" in part:
         part["srdf"] = _written(str(part["srdf"]), folder)
     if "package_dirs" in part:
-        named = [named_folder(str(one)) for one in part["package_dirs"]]
+        named = [named_folder(str(entry)) for entry in part["package_dirs"]]
         part["package_dirs"] = [(f"{name}=" if name else "") + _written(path, folder) for name, path in named]
     return part
 

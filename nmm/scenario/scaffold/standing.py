@@ -47,19 +47,19 @@ class Standing:
         robot, p, of_file = self.robot, self.robot.platform.p, accelerations_of(self.robot)
         joints = [_STRAIGHT if unit == "m/s" else _TURNING for unit in robot.u_units[p:]]
         usual = np.array([*self._of_platform(q), *joints])
-        usual = np.array([of_file.get(name, one) for name, one in zip(robot.u_names, usual, strict=True)])
+        usual = np.array([of_file.get(name, value) for name, value in zip(robot.u_names, usual, strict=True)])
         with np.errstate(divide="ignore", invalid="ignore"):
             tipping = np.where(shifts > 0.0, max(margin, 0.0) / (_SAFE * shifts), np.inf)
         most = share * np.where(margin > 0.0, np.minimum(usual, tipping), usual)
-        found = dict(zip(robot.u_names[:p], most[:p], strict=True))
+        largest = dict(zip(robot.u_names[:p], most[:p], strict=True))
         own = [robot.u_names.index(name) for name in of_file if robot.u_names.index(name) >= p]
         turning = [j for j in range(p, robot.n_u) if robot.u_units[j] == "rad/s" and j not in own]
         if turning:
-            found["arm"] = min(most[turning])
-        found |= {robot.u_names[j]: most[j] for j in range(p, robot.n_u) if j not in turning}
+            largest["arm"] = min(most[turning])
+        largest |= {robot.u_names[j]: most[j] for j in range(p, robot.n_u) if j not in turning}
         return {
             name: float(value) if of_file.get(name) == value else _rounded_down(float(value))
-            for name, value in found.items()
+            for name, value in largest.items()
         }
 
     def _of_platform(self, q: Array) -> Array:
@@ -85,13 +85,13 @@ class Standing:
         m = robot.n_u
         still, u_dot = np.zeros((m + 1, m)), np.vstack([np.zeros(m), np.eye(m)])
         try:
-            there = torques_along(robot, np.zeros(m + 1), np.tile(q, (m + 1, 1)), still, u_dot=u_dot)
+            torques = torques_along(robot, np.zeros(m + 1), np.tile(q, (m + 1, 1)), still, u_dot=u_dot)
         except InputError:  # no link has a mass
             return np.inf, np.zeros(m)
-        margin = float(there.margins[0])
+        margin = float(torques.margins[0])
         if not np.isfinite(margin):
             return margin, np.zeros(m)
-        shifts = np.linalg.norm(there.zero_moment[1:] - there.zero_moment[0], axis=1)
+        shifts = np.linalg.norm(torques.zero_moment[1:] - torques.zero_moment[0], axis=1)
         return margin, np.where(np.isfinite(shifts), shifts, 0.0)
 
 
@@ -103,4 +103,4 @@ def _rounded_down(value: float) -> float:
 
 def tipping(torques: Torques) -> Mapping[str, float] | None:
     """Where a run tips, by its `tips` finding: t, s; None where it does not."""
-    return next((one.where for one in torques.findings if one.code == "tips"), None)
+    return next((finding.where for finding in torques.findings if finding.code == "tips"), None)

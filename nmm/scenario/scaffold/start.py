@@ -53,9 +53,9 @@ def start_for(robot: Robot, hand: Hand, standing: Standing) -> Start | None:
     seen = [look.at(q) for q in _tried(robot, hand)]
     for axes in ("".join(some) for count in range(len(moved), 0, -1) for some in combinations(moved, count)):
         if len(axes) <= len(look.all):
-            found = _posture(look, axes) or _searched(look, seen, axes)
-            if found is not None:
-                return found
+            start = _posture(look, axes) or _searched(look, seen, axes)
+            if start is not None:
+                return start
     return None
 
 
@@ -82,9 +82,9 @@ class _Look:
         self.arm = [robot.input(name) for name in hand.joints]
 
     def at(self, q: Array) -> _Seen:
-        here = Configuration(self.robot, q)
-        J = here.jacobian(self.hand.frame)[:3] @ here.S / min(self.robot.reach, _LONGEST)
-        return _Seen(q, np.array(here.placement(self.hand.frame).translation), J)
+        configuration = Configuration(self.robot, q)
+        J = configuration.jacobian(self.hand.frame)[:3] @ configuration.S / min(self.robot.reach, _LONGEST)
+        return _Seen(q, np.array(configuration.placement(self.hand.frame).translation), J)
 
     def worth(self, seen: _Seen, axes: str) -> float:
         """How well the end-effector can be led from there: 0 at singularities and limits."""
@@ -142,16 +142,16 @@ def _posture(look: _Look, axes: str) -> Start | None:
 def _searched(look: _Look, seen: list[_Seen], axes: str) -> Start | None:
     """The best-conditioned posture away from limits, at rest or random; of the best, the least in contact."""
     robot = look.robot
-    best = sorted(seen, key=lambda one: -look.worth(one, axes))[:_BEST]
-    good = [one.q for one in best if look.worth(one, axes) > _GOOD * look.worth(best[0], axes)]
+    best = sorted(seen, key=lambda posture: -look.worth(posture, axes))[:_BEST]
+    good = [posture.q for posture in best if look.worth(posture, axes) > _GOOD * look.worth(best[0], axes)]
     if not good:
         return None
     touching = look.touching()
-    q = min(good, key=lambda one: (look.standing.margin(one) <= 0.0, touching(one)))
+    q = min(good, key=lambda q: (look.standing.margin(q) <= 0.0, touching(q)))
     q = robot.following.placed(np.clip(np.round(q, 2), *robot.q_limits.T))
     if look.at(q).sigma(axes, look.all) < REGULAR:
         return None
-    following = {one.joint for one in robot.mimic_joints}
+    following = {mimic.joint for mimic in robot.mimic_joints}
     named = {
         name: round(float(value), 12)
         for name, value in zip(robot.q_names, q, strict=True)
