@@ -64,8 +64,8 @@ class Reaching:
             return ""
         stands = f"the error does not fall: ‖e‖ stays at {norm:.3g}"
         if step.scale.min(initial=1.0) < 1.0:
-            kept = "limits and distances" if controller.solver.scene is not None else "limits"
-            return f"{stands}; {kept} leave {float(step.scale.min()):.2g} of the task's rate"
+            constraints = "limits and distances" if controller.solver.scene is not None else "limits"
+            return f"{stands}; {constraints} leave {float(step.scale.min()):.2g} of the task's rate"
         seen = stretched(controller, step.q, step.J) if np.all(np.isfinite(step.J)) else None
         return stands if seen is None else f"{stands}; {seen}"
 
@@ -116,7 +116,7 @@ class Driven:
     def places(self) -> list[list[float]]:
         """Where the targets are, and then the things."""
         values = [target.signal.value for target in self.targets]
-        return [one.tolist() for one in (*values, *(thing.middle(self.t) for thing in self.things))]
+        return [place.tolist() for place in (*values, *(thing.middle(self.t) for thing in self.things))]
 
     @property
     def has_objective(self) -> bool:
@@ -169,9 +169,9 @@ class Driven:
 
     def aim_here(self) -> None:
         """Aim each task at the value that it has now."""
-        here = Configuration(self.robot, self.q)
+        configuration = Configuration(self.robot, self.q)
         for number, task in enumerate(self.reacting.given.task):
-            self.aim(number, evaluate(task.function, 0.0, here).value)
+            self.aim(number, evaluate(task.function, 0.0, configuration).value)
 
     def with_choice(self, key: str, value: object) -> Made:
         """A controller with that choice, for `use`; made apart, as it may take longer than a step. `NmmError`
@@ -191,8 +191,8 @@ class Driven:
             return False
         try:
             held = self._plant is not None or (self._led.order == 2 and self._led.limits is not None)
-            given = self.elapsed, self.q, self.setup.dt, "zoh" if held else "rk4"
-            q_next, self.u = self._led.step(*given, plant=self._plant)
+            arguments = self.elapsed, self.q, self.setup.dt, "zoh" if held else "rk4"
+            q_next, self.u = self._led.step(*arguments, plant=self._plant)
         except NmmError as error:
             self.trouble = str(error)
             return False
@@ -211,12 +211,16 @@ class Driven:
         """The present place and what the controller finds there; wheels have rolled since the last look."""
         self.shown.roll(self.q[np.newaxis])
         step = self.reacting.evaluate(self.t, self.q)
-        here = Configuration(self.robot, self.q)
+        configuration = Configuration(self.robot, self.q)
         at = np.full((len(self.targets) + len(self.things), 3), np.nan)
         for i, target in enumerate(self.targets):
             if target.frame is not None:
                 on_robot = target.frame != CENTER_OF_MASS
-                at[i] = here.placement(target.frame).translation if on_robot else here.center_of_mass()[0]
+                at[i] = (
+                    configuration.placement(target.frame).translation
+                    if on_robot
+                    else configuration.center_of_mass()[0]
+                )
         known = bool(np.all(np.isfinite(step.J)))
         sigma = np.linalg.svd(step.J, compute_uv=False).min(initial=math.inf) if known else math.nan
         against, on = "", self._active()

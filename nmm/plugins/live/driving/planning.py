@@ -138,8 +138,8 @@ class Planning:
         ready = time.monotonic() > self._since + SETTLED and np.abs(driven.u).max() < STILL
         if ready and self._making is None and not self._refused:
             self._began = time.monotonic()
-            given = driven.reacting, driven.q.copy(), self._task, LiveTarget(value), driven.setup.dt
-            self._making = later(lambda: made_for(*given))
+            arguments = driven.reacting, driven.q.copy(), self._task, LiveTarget(value), driven.setup.dt
+            self._making = later(lambda: made_for(*arguments))
 
     def _leave(self) -> None:
         self.number += self._followed is not None
@@ -160,9 +160,9 @@ class Planning:
         """The command that draws the plan: the ways of the task's frame and of the platform, the trees that
         were grown, of the platform or else of the frame, and copies."""
         lines: list[Any] = []
-        found: Command = {"type": "plan", "lines": lines, "tree": None, "ghosts": None}
+        command: Command = {"type": "plan", "lines": lines, "tree": None, "ghosts": None}
         if self._followed is None:
-            return found
+            return command
         plan, frame = self._followed.plan, self._driven.targets[self._task].frame
         robot, t = plan.robot, np.linspace(0.0, plan.duration, POINTS)
         q, u = plan(t)
@@ -170,9 +170,9 @@ class Planning:
         floor = on_floor(q) if robot.platform.n_p else None
         grown = plan.tree.reshape(-1, robot.n)
         if floor is not None:
-            found["tree"] = packed(on_floor(grown), np.float32)
+            command["tree"] = packed(on_floor(grown), np.float32)
         elif frame is not None:
-            found["tree"] = packed(FramePath(robot, frame).positions(grown), np.float32)
+            command["tree"] = packed(FramePath(robot, frame).positions(grown), np.float32)
         for points in (motion.driven, floor):
             if points is not None:
                 lines.append(
@@ -180,8 +180,8 @@ class Planning:
                 )
         some = ghost_samples(motion, GHOSTS)[1:]
         if some:
-            found["ghosts"] = drawn.ghosts("/nmm/plan/ghosts", q[some], np.tile(wheels, (len(some), 1)), [])
-        return found
+            command["ghosts"] = drawn.ghosts("/nmm/plan/ghosts", q[some], np.tile(wheels, (len(some), 1)), [])
+        return command
 
 
 def on_floor(q: Array) -> Array:
@@ -191,11 +191,15 @@ def on_floor(q: Array) -> Array:
 
 def made_for(controller: Controller, q: Array, number: int, target: LiveTarget, dt: float) -> Made:
     """A plan from q to a target of a controller's task, with its limits and distances, and its follower."""
-    given, task = controller.given, controller.given.task.tasks[number]
-    kept: dict[str, Any] = {"collisions": given.collisions, "limits": given.limits, "margin": MARGIN}
-    found = plan(given.robot, q, Task(task.function, target), seconds=SECONDS, **kept)
-    reference = found.reference(tube=FARTHEST)
+    arguments, task = controller.given, controller.given.task.tasks[number]
+    constraints: dict[str, Any] = {
+        "collisions": arguments.collisions,
+        "limits": arguments.limits,
+        "margin": MARGIN,
+    }
+    planned = plan(arguments.robot, q, Task(task.function, target), seconds=SECONDS, **constraints)
+    reference = planned.reference(tube=FARTHEST)
     made = led_by(controller, reference, ProjectedGradient())
     made.step(0.0, q, dt)  # the first call compiles
     made.reset()
-    return Made(found, made, reference.function, target.value)
+    return Made(planned, made, reference.function, target.value)

@@ -327,7 +327,7 @@ class DriveSession(RobotSession):
             "scale": [step.scale.min(initial=1.0)],
         }
         seen = live_numbers(self._cameras(look), self.robot, step.q[np.newaxis])[0]
-        return finite([*(x for one in self._curves for x in known[one.name]), *step.u, *step.q, *seen])
+        return finite([*(x for curve in self._curves for x in known[curve.name]), *step.u, *step.q, *seen])
 
     def _state(self, look: Look) -> tuple[str, bool]:
         if self._driven.trouble:

@@ -164,26 +164,28 @@ class ScenarioSetup(DriveSetup):
         parts = self._with(settings).parts
         kind = parts.resolver.kind
         # Whether the scenario works with a resolver shows when it is chosen: trying takes as long as loading.
-        found = [Choice("resolver.kind", "method", RESOLVER, kind, tuple(RESOLVERS))]
+        choices = [Choice("resolver.kind", "method", RESOLVER, kind, tuple(RESOLVERS))]
         resolver = parts.resolver.model_dump()
         alpha = resolver.get("alpha")
         if _is_number(alpha) and alpha > 0.0:
-            found.append(self._number("resolver.alpha", "step α along −∇H", RESOLVER, alpha))
-        found.append(Choice("limits", "keep the limits", RESOLVER, parts.limits is not None))
+            choices.append(self._number("resolver.alpha", "step α along −∇H", RESOLVER, alpha))
+        choices.append(Choice("limits", "keep the limits", RESOLVER, parts.limits is not None))
         if self.scenario.parts.retreat is not None:
             chosen = parts.retreat is not None
-            found.append(Choice("retreat", "back off where the error stalls", RESOLVER, chosen))
+            choices.append(Choice("retreat", "back off where the error stalls", RESOLVER, chosen))
         for i, task in enumerate(parts.task):
             gain = task.model_dump().get("gain")
             if _is_number(gain):
                 text = f"K of {self._task_names[i]}"
-                found.append(self._number(f"task.{i}.gain", text, GAINS, gain, "1/s"))
+                choices.append(self._number(f"task.{i}.gain", text, GAINS, gain, "1/s"))
         weights = resolver.get("weights") or {}
         # Weights of groups are not one number per input.
         if "weights" in resolver and isinstance(weights, Mapping) and set(weights) <= set(self.robot.u_names):
             for name in self.robot.u_names:
-                found.append(self._number(f"resolver.weights.{name}", name, WEIGHTS, weights.get(name, 1.0)))
-        return found
+                choices.append(
+                    self._number(f"resolver.weights.{name}", name, WEIGHTS, weights.get(name, 1.0))
+                )
+        return choices
 
     def _number(self, key: str, text: str, group: str, value: float, unit: str = "") -> Choice:
         """A number whose range is about its first value, so that a slider's ends stay where they are."""
@@ -209,8 +211,8 @@ class ScenarioSetup(DriveSetup):
             elif key != "retreat" and (key != "limits" or value != (self.scenario.parts.limits is not None)):
                 chosen[key] = value
         if weights:
-            given = self.scenario.parts.resolver.model_dump().get("weights") or {}
-            chosen["resolver.weights"] = {**given, **weights}
+            defaults = self.scenario.parts.resolver.model_dump().get("weights") or {}
+            chosen["resolver.weights"] = {**defaults, **weights}
         return self.scenario.with_settings(chosen)
 
 
@@ -249,22 +251,22 @@ class RobotSetup(DriveSetup):
 
     def choices(self, settings: Settings) -> list[Choice]:
         kind = str(settings.get("resolver.kind", "dls"))
-        found = [Choice("resolver.kind", "method", RESOLVER, kind, self._kinds)]
-        found.append(Choice("limits", "keep the limits", RESOLVER, bool(settings.get("limits", True))))
+        choices = [Choice("resolver.kind", "method", RESOLVER, kind, self._kinds)]
+        choices.append(Choice("limits", "keep the limits", RESOLVER, bool(settings.get("limits", True))))
         for i, task in enumerate(Stack(tuple(self._tasks))):
             key = f"task.{i}.gain"
             text, value = f"K of {title_of(task, self.robot)}", float(settings.get(key, 2.0))
-            found.append(number(key, text, GAINS, 2.0, value, "1/s"))
-        return found
+            choices.append(number(key, text, GAINS, 2.0, value, "1/s"))
+        return choices
 
     @cached_property
     def _kinds(self) -> tuple[str, ...]:
-        found = []
+        kinds = []
         for kind in RESOLVERS:
             with suppress(NmmError, TypeError):
                 self.controller({"resolver.kind": kind})
-                found.append(kind)
-        return tuple(found)
+                kinds.append(kind)
+        return tuple(kinds)
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,23 +286,23 @@ class Target:
         rows = [{"name": name.removeprefix(f"{self.title}."), "unit": unit} for name, unit in self.rows]
         heading = f"Target of {self.title}"
         known = {} if self.frame is None else {"axes": self.axes, "rotation": self.rotation}
-        found = {"name": self.title, "heading": heading, "rows": rows, "frame": self.frame}
-        return {**found, "axes": {}, "rotation": (), **known}
+        fields = {"name": self.title, "heading": heading, "rows": rows, "frame": self.frame}
+        return {**fields, "axes": {}, "rotation": (), **known}
 
 
 def targets_of(controller: Controller, q: Array, *, at_robot: bool) -> tuple[Target, ...]:
     """A target for each task: at t = 0 and q (n,) its reference's value, or the robot's."""
-    here = Configuration(controller.robot, q)
-    found = []
+    configuration = Configuration(controller.robot, q)
+    targets = []
     for task in controller.given.task:
-        value = evaluate(task.function if at_robot else task.reference, 0.0, here).value
+        value = evaluate(task.function if at_robot else task.reference, 0.0, configuration).value
         rows = tuple((row.name, row.unit) for row in task.function.rows(controller.robot))
         shown = task.function.shown()
         axes = dict(shown.axes) if shown.positions is not None else {}
         frame = shown.positions or (shown.turns if shown.rotation else None)
         signal = LiveTarget(np.array(value), rows[0][1])
-        found.append(Target(title_of(task, controller.robot), signal, rows, frame, axes, shown.rotation))
-    return tuple(found)
+        targets.append(Target(title_of(task, controller.robot), signal, rows, frame, axes, shown.rotation))
+    return tuple(targets)
 
 
 def title_of(task: Task, robot: Robot) -> str:
@@ -325,5 +327,5 @@ def aimed(controller: Controller, targets: tuple[Target, ...]) -> Controller:
 def led_by(controller: Controller, task: Task, resolver: Resolver) -> Controller:
     """A controller of the same robot, limits and distances that does nothing but a task."""
     alone: dict[str, Any] = {"objective": None, "added_task": Stack(), "retreat": None, "steering": False}
-    given = controller.given._replace(task=Stack.of(task), resolver=resolver, dt=controller.dt, **alone)
-    return Controller(*given)
+    arguments = controller.given._replace(task=Stack.of(task), resolver=resolver, dt=controller.dt, **alone)
+    return Controller(*arguments)

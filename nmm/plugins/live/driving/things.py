@@ -27,7 +27,7 @@ class Thing:
     def __init__(self, points: Iterable[Function], robot: Robot, title: str) -> None:
         self.points, self.title = tuple(points), title
         self.away = LiveTarget(np.zeros(3))
-        self._here = Configuration(robot, robot.rest)  # they stand in the world, wherever the robot is
+        self._at_rest = Configuration(robot, robot.rest)  # they stand in the world, wherever the robot is
 
     def middle(self, t: float) -> Array:
         """(3,), m, where they are at t, s, in the mean."""
@@ -38,13 +38,13 @@ class Thing:
         self.away.set(to - self._before(t) if to.shape == (3,) else to)
 
     def _before(self, t: float) -> Array:
-        return np.mean([evaluate(point, t, self._here).value for point in self.points], axis=0)
+        return np.mean([evaluate(point, t, self._at_rest).value for point in self.points], axis=0)
 
     def for_page(self) -> dict[str, Any]:
         axes = {axis: row for row, axis in enumerate("xyz")}
         rows = [{"name": axis, "unit": "m"} for axis in axes]
-        found = {"name": self.title, "heading": self.title, "rows": rows, "frame": None}
-        return {**found, "axes": axes, "rotation": ()}
+        fields = {"name": self.title, "heading": self.title, "rows": rows, "frame": None}
+        return {**fields, "axes": axes, "rotation": ()}
 
 
 class Things:
@@ -58,17 +58,17 @@ class Things:
         groups: list[dict[object, Function]] = []
         for sight in _sights(controller):
             keyed = {key: point for point in sight.points if (key := self._key(point)) is not None}
-            joined = [one for one in groups if one.keys() & keyed.keys()]
-            groups = [one for one in groups if one not in joined]
-            for one in joined:
-                keyed |= one
+            joined = [group for group in groups if group.keys() & keyed.keys()]
+            groups = [group for group in groups if group not in joined]
+            for group in joined:
+                keyed |= group
             groups += [keyed] if keyed else []
         many = len(groups) > 1
         self.all = [
-            Thing(found.values(), robot, f"What is seen{f', {k + 1}' if many else ''}")
-            for k, found in enumerate(groups)
+            Thing(group.values(), robot, f"What is seen{f', {k + 1}' if many else ''}")
+            for k, group in enumerate(groups)
         ]
-        self._away = {key: thing.away for thing, found in zip(self.all, groups, strict=True) for key in found}
+        self._away = {key: thing.away for thing, group in zip(self.all, groups, strict=True) for key in group}
 
     def _key(self, point: Function) -> object:
         """None for one that is on the robot, or that is set from outside."""
@@ -79,12 +79,12 @@ class Things:
         """A controller of the same kind that sees them where they have been dragged to."""
         if not self.all:
             return controller
-        given = controller.given
-        limits = given.limits
+        arguments = controller.given
+        limits = arguments.limits
         if limits is not None:
             limits = copy(limits)
             limits.bounds = tuple(self._moved(bound) for bound in limits.bounds)
-        tasks = Stack(tuple(self._moved(task) for task in given.task))
+        tasks = Stack(tuple(self._moved(task) for task in arguments.task))
         return controller.with_arguments(task=tasks, limits=limits)
 
     def _moved(self, part: Any) -> Any:
@@ -105,7 +105,7 @@ class Things:
 def _sights(controller: Controller) -> list[Sight]:
     limits = controller.given.limits
     bounds = () if limits is None else limits.bounds
-    functions = (one.function for one in bounds if not isinstance(one, Limit))
-    tasks = (one.function for one in controller.given.task)
-    found = [function.shown().sees for function in (*tasks, *functions)]
-    return [sight for sight in found if sight is not None and sight.of_others is not None]
+    functions = (bound.function for bound in bounds if not isinstance(bound, Limit))
+    tasks = (task.function for task in controller.given.task)
+    sights = [function.shown().sees for function in (*tasks, *functions)]
+    return [sight for sight in sights if sight is not None and sight.of_others is not None]
