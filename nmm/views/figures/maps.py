@@ -194,7 +194,8 @@ def _held(drawn: Map) -> str:
 def _posture(drawn: Map, measure: str, *, worst: bool) -> Array:
     """The best of a workspace's best postures, or the worst of the worst, q (n,)."""
     values, q = (
-        one[measure] for one in ((drawn.worst, drawn.worst_q) if worst else (drawn.values, drawn.best_q))
+        arrays[measure]
+        for arrays in ((drawn.worst, drawn.worst_q) if worst else (drawn.values, drawn.best_q))
     )
     if not np.isfinite(values).any():
         return drawn.q
@@ -235,27 +236,27 @@ def _write_title(made: Figure, lines: list[tuple[str, bool]]) -> None:
         made.text(0.2 / width, y, text, va="top", **(head if headline else plain))
 
 
-def _draw_set(axes: Axes, drawn: Map, those: SingularSet, name: str, color: str) -> None:
+def _draw_set(axes: Axes, drawn: Map, singular: SingularSet, name: str, color: str) -> None:
     """Lines and points with an edge that shows them on any colour; one legend entry, which says if none."""
     white = color == "white"
     edge = resolver_style.BLACK if white else "white"
     width = 1.1 if white else 1.8
     halo = [withStroke(linewidth=width + 1.2, foreground=edge)]
-    label = f"{name} singular" + (f": {those.text()}" if those.empty or those.everywhere else "")
-    for line in those.lines:
+    label = f"{name} singular" + (f": {singular.text()}" if singular.empty or singular.everywhere else "")
+    for line in singular.lines:
         # Unsnapped: line and halo would go to different pixels.
         axes.plot(
             *line.T, "--" if white else "-", color=color, linewidth=width, label=label, path_effects=halo,
             clip_on=False, snap=False,
         )  # fmt: skip
         label = "_"
-    if len(those.points):
-        many = len(those.points) > MANY
+    if len(singular.points):
+        many = len(singular.points) > MANY
         size = 2.3 if many else 2.5 if white else 6.5
         axes.plot(
-            *those.points.T, "o" if white or many else "X", linestyle="none", color=color, markersize=size,
+            *singular.points.T, "o" if white or many else "X", linestyle="none", color=color, markersize=size,
             markeredgecolor=resolver_style.BLACK if white or many else "white",
             markeredgewidth=0.5 if many else 0.7, label=label, clip_on=False,
         )  # fmt: skip
-    elif not those.lines:
+    elif not singular.lines:
         axes.plot([], [], " ", label=label)

@@ -105,7 +105,7 @@ class Scene(Viewed):
         names = ["desired path"] if "desired" in self.lines else []
         names += ["where odometry has it"] * ("believed" in self.lines)
         names += [self._path_name, "start", "end"]
-        names += [*dict.fromkeys(one.name for one in self.outlines), *self.seen.names]
+        names += [*dict.fromkeys(outline.name for outline in self.outlines), *self.seen.names]
         return names if not len(self.trajectory.marks) else [*names, "target"]
 
     @property
@@ -116,7 +116,7 @@ class Scene(Viewed):
         return [*self._drawn(view), *(place.corners for place in self.times_at(view, width))]
 
     def _drawn(self, view: View) -> list[Array]:
-        robots, bodies = (pose.points() for pose in self.poses), (one.points for one in self.outlines)
+        robots, bodies = (pose.points() for pose in self.poses), (outline.points for outline in self.outlines)
         paths = *self.lines.values(), *self.seen.parts
         return [view.of(part) for part in (*robots, *paths, *bodies, self.trajectory.marks)]
 
@@ -137,12 +137,12 @@ class Scene(Viewed):
             ground = Ground(lambda axes: self._draw_scene(axes, view), low, high, scale)
             for _ in range(4):
                 scale = 1.1 * extent / width
-                found = places(subjects, ground, scale)
-                every = np.vstack([drawn[:, :1], *[place.corners[:, :1] for place in found]])
+                labels = places(subjects, ground, scale)
+                every = np.vstack([drawn[:, :1], *[place.corners[:, :1] for place in labels]])
                 extent = float(np.ptp(every))
                 if 1.08 * extent / width <= scale:  # what stands around is a margin of 8 %
                     break
-            self._labels[width] = found
+            self._labels[width] = labels
         return self._labels[width]
 
     def _times(self) -> list[str]:
@@ -203,7 +203,7 @@ class Scene(Viewed):
 def outlines(trajectory: Trajectory, times: Array) -> list[Outline]:
     """The obstacles, those that move at each of the times, once where they rest, and the scenery;
     half-spaces have none."""
-    found: list[Outline] = []
+    drawn: list[Outline] = []
     for obstacle in trajectory.obstacles:
         points = outline_points(obstacle.shape.geometry())
         if points is None:
@@ -218,12 +218,12 @@ def outlines(trajectory: Trajectory, times: Array) -> list[Outline]:
                 own[-1] = Outline(moved, strength, (before.times[0], t))
             else:
                 own.append(Outline(moved, strength, (t, t) if obstacle.moves else None))
-        found += own
+        drawn += own
     for thing in trajectory.surroundings.scenery:
         if (points := outline_points(thing.geometry)) is not None:
             place = thing.places[0]
-            found.append(Outline(points @ place[:3, :3].T + place[:3, 3], 1.0, None, "scenery"))
-    return found
+            drawn.append(Outline(points @ place[:3, :3].T + place[:3, 3], 1.0, None, "scenery"))
+    return drawn
 
 
 def _strengths(count: int) -> list[float]:

@@ -22,9 +22,9 @@ MUCH = 30.0
 def laps(found: Repeatability, *, width: float = style.PAGE) -> Figure:
     """Drift of the posture in each lap, logarithmic; below it the platforms' paths, if any, from above. Full
     turns of joints without limits are no drift. InputError if no lap was finished."""
-    runs = [one for one in found.laps if len(one.distance)]
+    runs = [run for run in found.laps if len(run.distance)]
     expect(runs, "figure of laps", "at least one lap")
-    worn = resolver_style.looks([one.name for one in runs])
+    worn = resolver_style.looks([run.name for run in runs])
     if len(worn) == 1:
         worn = [worn[0]._replace(dashes="-")]
     across = width - style.LEFT - style.RIGHT
@@ -44,7 +44,7 @@ def laps(found: Repeatability, *, width: float = style.PAGE) -> Figure:
 
 
 def _draw_drift(axes: Axes, runs: list[Laps], worn: list[resolver_style.Look]) -> None:
-    drifts = [np.maximum(one.distance, LOWEST) for one in runs]
+    drifts = [np.maximum(run.distance, LOWEST) for run in runs]
     every, longest = np.concatenate(drifts), max(map(len, drifts))
     for k, (drift, look) in enumerate(zip(drifts, worn, strict=True)):
         axes.plot(
@@ -70,12 +70,12 @@ def _draw_paths(axes: Axes, runs: list[Laps], worn: list[resolver_style.Look], w
     desired = _desired(runs[0])
     if desired is not None:
         axes.plot(*desired.T, ":", color=resolver_style.BLACK, linewidth=1.1, label=next(names))
-    for one, look in zip(runs, worn, strict=True):
-        path, samples = _path(one), _samples(one)
+    for run, look in zip(runs, worn, strict=True):
+        path, samples = _path(run), _samples(run)
         last = path[len(path) - 1 - samples :]
         axes.plot(*path.T, look.dashes, color=look.color, linewidth=0.7, alpha=0.6)
         axes.plot(*last.T, look.dashes, color=look.color, linewidth=1.9, label=next(names))
-        axes.plot(*one.q[:, :2].T, "o", color=look.color, markersize=3.5, linestyle="none")
+        axes.plot(*run.q[:, :2].T, "o", color=look.color, markersize=3.5, linestyle="none")
     (left, low), (right, high) = _limits(runs)
     axes.set(xlim=(left, right), ylim=(low, high))
     for axis in (axes.xaxis, axes.yaxis):
@@ -89,19 +89,19 @@ def _path_names(runs: list[Laps], worn: list[resolver_style.Look]) -> list[str]:
     return [*desired, *(f"platform, {look.name}, last lap thick" for look in worn)]
 
 
-def _samples(one: Laps) -> int:
-    return round(one.period / one.trajectory.dt)
+def _samples(run: Laps) -> int:
+    return round(run.period / run.trajectory.dt)
 
 
-def _path(one: Laps) -> Array:
+def _path(run: Laps) -> Array:
     """The platform's reference point, (N, 2) m, to the end of the last whole lap."""
-    return np.asarray(one.trajectory.q[: len(one.distance) * _samples(one) + 1, :2])
+    return np.asarray(run.trajectory.q[: len(run.distance) * _samples(run) + 1, :2])
 
 
-def _desired(one: Laps) -> Array | None:
+def _desired(run: Laps) -> Array | None:
     """The desired path of a lap, (N, 2) m, if the task has one."""
-    desired = one.trajectory.desired
-    return None if desired is None else desired[: _samples(one) + 1, :2]
+    desired = run.trajectory.desired
+    return None if desired is None else desired[: _samples(run) + 1, :2]
 
 
 def _limits(runs: list[Laps]) -> tuple[Array, Array]:

@@ -69,7 +69,9 @@ class Pose:
     def outlines(self, view: View) -> tuple[list[Array], list[Array]]:
         """The platform's shapes and the wheels as outlines (k, 2) as they are seen in a view."""
         if view not in self._outlines:
-            bodies, wheels = ([hull(view.of(one)) for one in shapes] for shapes in (self.body, self.wheels))
+            bodies, wheels = (
+                [hull(view.of(shape)) for shape in shapes] for shapes in (self.body, self.wheels)
+            )
             self._outlines[view] = bodies, wheels
         return self._outlines[view]
 
@@ -136,11 +138,13 @@ class Silhouette:
         shown = self._shown
         joints = {joint: places[shown[joint]][:3, 3] for joint in self._arm}
         tips = [(joint, world(shown[joint], point)) for joint, point in self._tips]
-        ends = [(joints[parent], joints[one]) for one, parent in self._parents.items() if parent in joints]
+        ends = [
+            (joints[parent], joints[child]) for child, parent in self._parents.items() if parent in joints
+        ]
         ends += [(joints[joint], tip) for joint, tip in tips if joint in joints]
-        ends += [(world(shown[self._parents[one]], foot), joints[one]) for one, foot in self._feet]
+        ends += [(world(shown[self._parents[joint]], foot), joints[joint]) for joint, foot in self._feet]
         body = [world(shown[solid.joint], solid.points) for solid in self._body]
-        of_root = [part for one, part in zip(self._body, body, strict=True) if one.joint == self._root]
+        of_root = [part for solid, part in zip(self._body, body, strict=True) if solid.joint == self._root]
         return Pose(
             body=body,
             main=np.vstack(of_root or body),
@@ -166,23 +170,23 @@ def _heading_mark(body: list[Solid], root: int) -> Array:
 
 def _tips(robot: Robot, arm: Sequence[int], frame: str | None) -> list[tuple[int, Array]]:
     """Where the arm's lines end: joint and point in the joint's frame."""
-    model, found = robot.model, []
+    model, tips = robot.model, []
     if frame is not None:
         wanted = model.frames[robot.frame_id(frame)]
-        found.append((int(wanted.parentJoint), np.array(wanted.placement.translation)))
-    inner = {int(model.parents[joint]) for joint in arm} | {joint for joint, _ in found}
+        tips.append((int(wanted.parentJoint), np.array(wanted.placement.translation)))
+    inner = {int(model.parents[joint]) for joint in arm} | {joint for joint, _ in tips}
     for leaf in (joint for joint in arm if joint not in inner):
         carried = [frame.placement.translation for frame in model.frames if frame.parentJoint == leaf]
         outermost = max(carried, key=np.linalg.norm, default=np.zeros(3))
         if np.linalg.norm(outermost) > 1e-6:
-            found.append((leaf, np.array(outermost)))
-    return found
+            tips.append((leaf, np.array(outermost)))
+    return tips
 
 
 def _feet(robot: Robot, arm: Sequence[int]) -> list[tuple[int, Array]]:
     """Joint and foot (3,), in its parent joint's frame, of columns that carry an arm's first joint: the
     origin of the link below, where the joint turns or slides along the line from there."""
-    model, found = robot.model, []
+    model, feet = robot.model, []
     for joint in arm:
         name = model.names[joint]
         if model.parents[joint] in arm or not model.existFrame(name, pin.FrameType.JOINT):
@@ -195,8 +199,8 @@ def _feet(robot: Robot, arm: Sequence[int]) -> list[tuple[int, Array]]:
         offset = float(np.linalg.norm(np.cross(column, along)))
         high = float(np.linalg.norm(column)) > _COLUMN
         if below.parentJoint == model.parents[joint] and high and offset < _COLUMN:
-            found.append((joint, foot))
-    return found
+            feet.append((joint, foot))
+    return feet
 
 
 #: Directions, spread evenly over the sphere, in which a mesh's outermost points are kept.

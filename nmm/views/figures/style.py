@@ -232,7 +232,7 @@ def units(names: Iterable[str]) -> str:
 
 def groups(kinds: Sequence[str]) -> dict[str, list[int]]:
     """Indices by unit, in order of appearance."""
-    return {kind: [i for i, one in enumerate(kinds) if one == kind] for kind in dict.fromkeys(kinds)}
+    return {kind: [i for i, other in enumerate(kinds) if other == kind] for kind in dict.fromkeys(kinds)}
 
 
 def curve(

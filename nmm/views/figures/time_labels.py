@@ -59,7 +59,7 @@ def places(subjects: Sequence[Subject], ground: Ground, scale: float) -> list[Pl
     directions = np.column_stack([np.cos(angles), np.sin(angles)])
     gaps = np.concatenate([[0.0], np.geomspace(0.02, _FARTHEST, _DISTANCES - 1)]) * scale
     centre = 0.5 * (ground.low + ground.high)
-    found: list[Place] = []
+    placed: list[Place] = []
     edges = [_sampled([np.vstack([outline, outline[:1]])], 4.0 * cell) for _, outline in subjects]
     for number, (text, outline) in enumerate(subjects):
         half = 0.5 * scale * np.array([_CHARACTER * len(text), _LINE]) + pad
@@ -71,7 +71,7 @@ def places(subjects: Sequence[Subject], ground: Ground, scale: float) -> list[Pl
         candidates = (middle + ahead[None] + gaps[:, None, None] * directions).reshape(-1, 2)
         # Of places as near, the one farther outside.
         outwards = directions @ (middle - centre) / (np.linalg.norm(middle - centre) + scale)
-        free = ground.free(candidates, half) & _clear(candidates, half, found, leads)
+        free = ground.free(candidates, half) & _clear(candidates, half, placed, leads)
         candidates, outwards = candidates[free], np.tile(outwards, len(gaps))[free]
         apart, feet = _apart(candidates, half, edges[number])
         others = np.vstack([np.zeros((0, 2)), *edges[:number], *edges[number + 1 :]])
@@ -82,17 +82,17 @@ def places(subjects: Sequence[Subject], ground: Ground, scale: float) -> list[Pl
                 place = Place(candidates[k], half, None)
                 break
             lead = _sampled([np.array([feet[k], candidates[k]])], cell)
-            if _clear(lead, np.full(2, pad), found, leads).all():
+            if _clear(lead, np.full(2, pad), placed, leads).all():
                 place = Place(candidates[k], half, feet[k])
                 leads = np.vstack([leads, lead])
                 break
         if place is None:  # no place within reach is free: far above everything there is one
             across = np.linspace(ground.low[0] + half[0], ground.high[0] - half[0], 200)
             above = np.column_stack([across, np.full(len(across), ground.high[1] - half[1])])
-            above = above[_clear(above, half, found, leads)]
+            above = above[_clear(above, half, placed, leads)]
             place = Place(above[np.argmin(np.abs(above[:, 0] - middle[0]))], half, middle)
-        found.append(place)
-    return found
+        placed.append(place)
+    return placed
 
 
 def _sampled(lines: Sequence[Array], spacing: float) -> Array:

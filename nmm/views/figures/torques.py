@@ -25,7 +25,7 @@ def torques(found: Torques, *, width: float = style.PAGE) -> Figure:
     """
     limited = np.isfinite(found.efforts)
     shares = found.torques / np.where(limited, found.efforts, 1.0)
-    parts: Mapping[str, list[int]] = style.groups(["limited" if one else "free" for one in limited])
+    parts: Mapping[str, list[int]] = style.groups(["limited" if limit else "free" for limit in limited])
     free = (unit for unit, limit in zip(found.dynamics.actuators.units, limited, strict=True) if not limit)
     heads = {"limited": "torque, share of limit", "free": f"torque {style.units(free)}"}
     shown = {name: parts[name] for name in heads if name in parts}
