@@ -1,4 +1,4 @@
-"""Recording: the samples of a run collected, and what people look at in them worked out."""
+"""Recording: collects the samples of a run, and computes the quantities of its trajectory from them."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ class Recorder:
 
     @property
     def places(self) -> list[tuple[Any, ...]]:
-        """Where obstacles were at the samples so far (`Setting.places`)."""
+        """Obstacles' places at the samples so far (`Scene.places`)."""
         return self._places[: self._count]
 
     def add(self, sample: Step) -> None:
@@ -161,7 +161,7 @@ class Recorder:
             self.findings.append(found)
 
     def noticed(self) -> list[Finding]:
-        """What the numbers that the run replaced have noticed; once where two tasks have one camera."""
+        """Findings of the numbers that the run replaces; once where two tasks have one camera."""
         findings: list[Finding] = []
         for renewal in self.controller.solver.program.renewals:
             findings += (finding for finding in renewal.noticed(self.reached) if finding not in findings)
@@ -169,7 +169,7 @@ class Recorder:
 
     @property
     def _planned(self) -> Array | None:
-        """Where the plan that it follows was at the samples, (N, n)."""
+        """The configurations (N, n) of the plan followed, at the samples; None without one."""
         renewed = [renewal.planned(self.t) for renewal in self.controller.solver.program.renewals]
         plans = (*renewed, *(task.function.planned(self.t) for task in self.controller.task))
         return next((plan for plan in plans if plan is not None), None)

@@ -183,7 +183,7 @@ def _explained(verdict: Verdict) -> Verdict:
 
 
 def _into(controller: Controller, swept: Swept | None, trajectory: Trajectory) -> Finding | None:
-    """What a run that keeps distances ran into."""
+    """The collision of a run that keeps distances, if any."""
     setting = controller.solver.scene
     return None if setting is None or swept is None else ran_into(setting, swept, trajectory.t)
 

@@ -1,4 +1,4 @@
-"""What a run, or a leg of one, amounts to: its error against its expected decay, its inputs against the task.
+"""Judges a run, or a leg of one: its error against its expected decay, its inputs against the task.
 
 Examined at its end, as controller and targets may change later; only a shorter dt, which takes as long as
 several runs, is tried when the verdict is read (`Judged.trials`).
@@ -103,7 +103,7 @@ class Trials:
         return bool(np.all(~(off > SAME * (1.0 + np.abs(error)))))
 
     def _try(self, dt: float, most: int) -> tuple[Advice | None, list[Instability]]:
-        """What a run of at most `most` steps says of dt, s, and the remaining instabilities."""
+        """Run at most `most` steps of dt, s: the advice if the run behaves, and the instabilities left."""
         # The whole run where it fits, else from a little before it went wrong.
         t, controller = self._t, self._controller
         fits = t[-1] - t[0] <= most * dt
@@ -130,7 +130,7 @@ def passed(recorder: Recorder) -> Finding | None:
 
 @dataclass(frozen=True)
 class Judged:
-    """What was seen of a leg that ended, with outcome and reasons of its integration.
+    """The judgement of a leg that ended, with outcome and reasons of its integration.
 
     lost : what nothing moves, at a singular end
     assessment : the assessment, if it was made
@@ -313,7 +313,7 @@ def _seen(
 
 
 def _lost(leg: Leg) -> Iterator[Finding]:
-    """What nothing moves where a run became singular, and whether its target is out of reach."""
+    """Findings at a singular end: task directions that no input moves, a target out of reach."""
     controller, recorder, ended = leg.controller, leg.recorder, leg.ended
     if ended.outcome is not Outcome.SINGULAR:
         return

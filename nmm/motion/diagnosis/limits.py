@@ -1,4 +1,4 @@
-"""What a run says of limits and distances: exceeded limits, collisions, what held it back."""
+"""Findings of a run about limits and distances: exceeded limits, collisions, limits that bind."""
 
 from collections.abc import Collection, Iterable, Iterator
 from typing import Any
@@ -138,7 +138,7 @@ def _of_rates(units: Iterable[str]) -> str:
 
 
 def distances_short(setting: Scene, found: Swept, t: Array, counts: Counts) -> Iterator[Finding]:
-    """What was left out, where distances fell short at times t (N,), s, and how often the inputs braked."""
+    """Findings on distances at times t (N,), s: pairs left out, distances that fell short, braking."""
     yield from (Finding("distances_note", {"text": note}) for note in setting.notes)
     if not len(t):
         return
@@ -170,7 +170,7 @@ def distances_short(setting: Scene, found: Swept, t: Array, counts: Counts) -> I
 
 
 def ran_into(setting: Scene, found: Swept, t: Array) -> Finding | None:
-    """What was run into after being clear, and when; such a run is not completed."""
+    """The collision of a run that was clear before, and its time; such a run is not completed."""
     within = found.between < -ROUNDING
     into = np.flatnonzero(within & np.logical_or.accumulate(~within))
     if not into.size:
