@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from nmm.base.arrays import Integers
 from nmm.control.controller import Controller
 from nmm.control.sequencing.sequence import Schedule
 from nmm.control.step.quantities import QUANTITIES, saved
@@ -31,11 +32,18 @@ def join(
     first = np.cumsum([0, *(len(task.rows(robot)) for task in stack)])
     record = joined_record(controller, schedule, legs)
     count = sum(map(len, parts))
-    arrays = {
-        quantity.name: getattr(record, quantity.name)
-        for quantity in saved()
-        if quantity.shape in ("Ns", "Nl")
-    }
+    sizes = {"N": count, "s": len(rows), "l": len(stack.levels(robot))}
+    arrays: dict[str, Any] = {}
+    for quantity in saved():
+        if quantity.shape not in ("Ns", "Nl"):
+            continue
+        arrays[quantity.name] = getattr(record, quantity.name, None)
+        if arrays[quantity.name] is None:  # computed from what is recorded
+            arrays[quantity.name] = quantity.room(sizes)
+            for (_, samples, columns), part in zip(_places(schedule, robot, legs), parts, strict=True):
+                positions = columns[quantity.shape[1]]
+                if positions:
+                    arrays[quantity.name][np.ix_(samples, positions)] = part[quantity.name]
     # What is of the run as a whole is worked out anew: distances, and what is drawn.
     for quantity in saved():
         if quantity.name not in arrays and quantity.shape.startswith("N") and not quantity.optional:
@@ -94,19 +102,9 @@ def room_for(controller: Controller, count: int) -> Recorded:
 
 def joined_record(controller: Controller, schedule: Schedule, legs: Sequence[Leg]) -> Recorded:
     """The legs' samples as a record of all tasks' rows, NaN (-1) where a task is inactive."""
-    robot, stack = controller.robot, schedule.tasks
-    levels = sorted({task.priority for task in stack})
-    first = np.cumsum([0, *(len(task.rows(robot)) for task in stack)])
-    whole, begin = room_for(controller, sum(len(leg.recorder) for leg in legs)), 0
-    for leg in legs:
-        on, recorded = np.flatnonzero(leg.active), leg.recorder.so_far
-        samples = begin + np.arange(len(leg.recorder))
-        begin += len(samples)
-        places = sorted({stack.tasks[i].priority for i in on})
-        columns = {
-            "s": [k for i in on for k in range(first[i], first[i + 1])],
-            "l": [levels.index(priority) for priority in places],
-        }
+    whole = room_for(controller, sum(len(leg.recorder) for leg in legs))
+    for leg, samples, columns in _places(schedule, controller.robot, legs):
+        recorded = leg.recorder.so_far
         for name, values in whole._asdict().items():
             shape = QUANTITIES[name].shape[1:]
             sizes = zip(shape, values.shape[1:], strict=True)
@@ -114,6 +112,29 @@ def joined_record(controller: Controller, schedule: Schedule, legs: Sequence[Leg
             own = tuple(slice(len(each)) for each in some)  # without a task, a leg has a row of its own
             values[np.ix_(samples, *some)] = getattr(recorded, name)[:, *own]
     return whole
+
+
+def _places(
+    schedule: Schedule, robot: Robot, legs: Sequence[Leg]
+) -> Iterator[tuple[Leg, Integers, dict[str, list[int]]]]:
+    """Each leg with the samples of the whole run that are its own, and the columns of its rows (s) and levels
+    (l) among those of all tasks."""
+    stack, begin = schedule.tasks, 0
+    levels = sorted({task.priority for task in stack})
+    first = np.cumsum([0, *(len(task.rows(robot)) for task in stack)])
+    for leg in legs:
+        on = np.flatnonzero(leg.active)
+        samples = begin + np.arange(len(leg.recorder))
+        begin += len(samples)
+        places = sorted({stack.tasks[i].priority for i in on})
+        yield (
+            leg,
+            samples,
+            {
+                "s": [k for i in on for k in range(first[i], first[i + 1])],
+                "l": [levels.index(priority) for priority in places],
+            },
+        )
 
 
 def row_names(robot: Robot, schedule: Schedule) -> tuple[str, ...]:
