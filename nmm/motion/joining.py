@@ -41,8 +41,8 @@ def join(
         if arrays[quantity.name] is None:  # computed from what is recorded
             arrays[quantity.name] = quantity.room(sizes)
             for (_, samples, columns), part in zip(_places(schedule, robot, legs), parts, strict=True):
-                positions = columns[quantity.shape[1]]
-                if positions:
+                positions = np.array(columns[quantity.shape[1]], dtype=np.int64)
+                if positions.size:
                     arrays[quantity.name][np.ix_(samples, positions)] = part[quantity.name]
     # What is of the run as a whole is worked out anew: distances, and what is drawn.
     for quantity in saved():

@@ -28,6 +28,7 @@ from nmm.base.kernels.declared import declare
 from nmm.base.kernels.entries import PLAIN_OPTIONS, Entry, Options, entry
 from nmm.base.kernels.signatures import (
     Array,
+    RecordPlace,
     Tuple,
     Type,
     boolean,
@@ -71,6 +72,8 @@ class Kernel:
 
     @cached_property
     def _call(self) -> Callable[..., Any]:
+        if any(isinstance(kind, RecordPlace) for kind in self.signature.args):
+            return self.compiled  # compiled again, for Python's records, which are tuples
         call = checked_by_caller(self.compiled, self.signature)
         return _expecting(self.signature.args, call) if isinstance(self.compiled, Compiled) else call
 
