@@ -50,15 +50,12 @@ def fields(found: object, names: str) -> dict[str, Any]:
 
 
 def say(text: str = "") -> None:
-    """Print lines; one that is too long for a terminal goes on below itself, two columns in."""
+    """Print a line; one that is too long for a terminal goes on below itself, two columns in."""
     out = console()
-    for line in text.split("\n"):
-        if out.is_terminal and len(line) > out.width:
-            indent = " " * (len(line) - len(line.lstrip()) + 2)
-            line = fill(
-                line, out.width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
-            )
-        show_text(line)
+    if out.is_terminal and len(text) > out.width:
+        indent = " " * (len(text) - len(text.lstrip()) + 2)
+        text = fill(text, out.width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+    show_text(text)
 
 
 def rounded(value: float, largest: float) -> float:

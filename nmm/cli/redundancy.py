@@ -30,6 +30,7 @@ from nmm.cli.output import FAILED, OK, complain, print_table, progress, show_tab
 if TYPE_CHECKING:
     from nmm.analysis.null_space.laps import Repeatability
     from nmm.analysis.null_space.moving import SelfMotion
+    from nmm.analysis.null_space.report import RedundancyReport
 
 #: Between samples of a self-motion, s; less for short ones.
 DT = 0.01
@@ -67,7 +68,6 @@ def redundancy(
     from nmm.analysis.null_space.moving import self_motion as moved_along
     from nmm.analysis.null_space.null_fields import expect_direction
     from nmm.base.arrays import positive
-    from nmm.cli.document import say
     from nmm.cli.subjects import studied
 
     if self_motion is None and (html is not None or play):
@@ -81,7 +81,7 @@ def redundancy(
     found = studied(subject.subject, **subject.keywords(), **loading.keywords())
     free = report.redundancy(found.subject, found.q, found.t)
     if direction is None:
-        say(free.text())
+        _show_report(free)
         return
     expect_direction(found.robot, free.J, free.rank_J, direction, "--self-motion")
     dt = min(DT, duration / 4.0)
@@ -90,9 +90,9 @@ def redundancy(
             found.subject, found.q, t=found.t, direction=direction, duration=duration, speed=speed, dt=dt
         )
     except SingularError:
-        say(free.text())
+        _show_report(free)
         raise
-    say(free.text())
+    _show_report(free)
     _show_self_motion(moved)
     short = moved.text if len(moved.text) <= LONGEST_TITLE else "self-motion"
     title = f"{found.robot.name}: {short}"
@@ -128,6 +128,13 @@ def direction_of(text: str) -> int | str | dict[str, float]:
         return int(text)
     except ValueError:
         return text
+
+
+def _show_report(report: RedundancyReport) -> None:
+    from nmm.cli.document import say
+
+    for line in report.text().splitlines():
+        say(line)
 
 
 def _show_self_motion(moved: SelfMotion) -> None:

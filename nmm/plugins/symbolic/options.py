@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from nmm.base.errors import InputError, expect
 from nmm.base.plugins import OptionGroup
+from nmm.base.text_format import listed, value_text
 from nmm.cli.options import flag, option
-from nmm.cli.output import OK, progress
+from nmm.cli.output import OK, progress, show_table, show_text
+
+if TYPE_CHECKING:
+    from nmm.cli.subjects import Studied
+    from nmm.plugins.symbolic.search.many_starts import SingularitySearch
+    from nmm.plugins.symbolic.search.nearest import SingularPoint
 
 #: From how many configurations a search starts.
 STARTS = 200
-NOT_FOUND = "no singular configuration found near this one, nor elsewhere inside the limits"
 
 
 @dataclass(frozen=True)
@@ -77,23 +82,70 @@ class SearchOptions(OptionGroup):
 
     def answer(self, *subject: Any) -> int | None:
         """Search for a robot with its task, with a characteristic length, and print the result."""
-        from nmm.cli.document import say
-        from nmm.plugins.symbolic.search.many_starts import find_singularities
-        from nmm.plugins.symbolic.search.nearest import nearest_singularity
-
         studied, length = subject
-        options: dict[str, Any] = {
-            "seed": self.seed or 0, "part": self.part or "robot", "length": length, "t": studied.t,
-        }  # fmt: skip
-        if self.search:
-            starts = STARTS if self.starts is None else self.starts
-            with progress("searching") as options["progress"]:
-                search = find_singularities(studied.subject, starts=starts, at=studied.q, **options)
-            say(search.text())
-        if self.nearest:
-            with progress("the nearest") as options["progress"]:
-                point = nearest_singularity(studied.subject, studied.q, **options)
-            if self.search:
-                say()
-            say(NOT_FOUND if point is None else point.text())
+        starts = STARTS if self.starts is None else self.starts
+        options = {"seed": self.seed or 0, "part": self.part or "robot", "length": length}
+        search_command(studied, starts if self.search else None, self.nearest, **options)
         return OK
+
+
+def search_command(
+    studied: Studied, starts: int | None = None, nearest: bool = False, **options: Any
+) -> None:
+    """Search all singular configurations from so many starts, the nearest to the one studied, or both; print
+    what was found. `options` : seed, part and length of `find_singularities`."""
+    from nmm.plugins.symbolic.search.many_starts import find_singularities
+    from nmm.plugins.symbolic.search.nearest import nearest_singularity
+
+    options["t"] = studied.t
+    if starts is not None:
+        with progress("searching") as options["progress"]:
+            search = find_singularities(studied.subject, starts=starts, at=studied.q, **options)
+        show_search(search)
+    if nearest:
+        with progress("the nearest") as options["progress"]:
+            found = nearest_singularity(studied.subject, studied.q, **options)
+        if starts is not None:
+            show_text()
+        show_nearest(found)
+
+
+def show_search(search: SingularitySearch) -> None:
+    """The families in a table, what each loses and where, what was searched."""
+    show_text(search.summary)
+    if search.found and not search.everywhere:
+        rows = [
+            (
+                str(number),
+                family.conditions,
+                ", ".join(family.free) or "nothing",
+                f"{family.dimension} of {family.moving}",
+                f"{family.rank} of {family.full_rank}",
+                str(family.starts),
+            )
+            for number, family in enumerate(search.families, 1)
+        ]
+        columns = ["", "where", "free", "dimension", "rank", "starts"]
+        show_table(columns, rows, numeric=columns[3:])
+    for number, family in enumerate(search.families, 1):
+        at = search.configuration_text(family.examples[0])
+        which = "" if search.everywhere else f"{number} "
+        show_text(f"{which}loses {listed(family.lost)}{f', at {at}' if at else ''}")
+    for line in search.remarks:
+        show_text(line)
+
+
+def show_nearest(point: SingularPoint | None) -> None:
+    if point is None:
+        show_text("no singular configuration found near this one, nor elsewhere inside the limits")
+        return
+    show_text(point.summary)
+    if point.changes:
+        rows = [
+            (name, value_text(float(there), unit), value_text(point.changes[name], unit))
+            for name, there, unit in zip(point.names, point.q, point.units, strict=True)
+            if name in point.changes
+        ]
+        show_table(["", "there", "change"], rows)
+    for line in point.remarks:
+        show_text(line)

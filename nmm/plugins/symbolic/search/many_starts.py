@@ -125,12 +125,7 @@ class SingularitySearch:
 
     def text(self) -> str:
         """Everything, in lines."""
-        lines = [self.summary]
-        for family in self.families:
-            dimension = f"dimension {family.dimension} of {family.moving}"
-            example = self.configuration_text(family.examples[0])
-            lines.append(f"  {family.text}; {dimension}{f', as at {example}' if example else ''}")
-        return "\n".join([*lines, *self.remarks])
+        return "\n".join([self.summary, *(f"  {family.text}" for family in self.families), *self.remarks])
 
 
 def find_singularities(

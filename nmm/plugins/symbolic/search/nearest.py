@@ -93,11 +93,7 @@ class SingularPoint:
             return f"singular already: loses {listed(self.lost)} (rank {self.rank} of {self.full_rank})"
         metric = "" if "m" not in self.units else f" (rad; {self.length:g} m count as 1 rad)"
         at = zip(self.names, self.q, self.units, strict=True)
-        where = [
-            f"{name} = {value_text(value, unit)} (by {value_text(self.changes[name], unit)})"
-            for name, value, unit in at
-            if name in self.changes
-        ]
+        where = [f"{name} = {value_text(value, unit)}" for name, value, unit in at if name in self.changes]
         return f"nearest singular configuration: distance {self.distance:.4g}{metric}, at {listed(where)}"
 
     @property
