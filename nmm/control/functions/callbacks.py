@@ -48,8 +48,8 @@ def of_configuration(
     derivative: str = "jacobian",
 ) -> tuple[Stage, ...]:
     """The stage of a user's function of the configuration alone; `derivative` is what users call ∂/∂q."""
-    said = f"{name} {called(value)}"
-    callback = Differentiated(value, None, value_q, rows, said, of_time=False, derivative=derivative)
+    label = f"{name} {called(value)}"
+    callback = Differentiated(value, None, value_q, rows, label, of_time=False, derivative=derivative)
     return (stage(rows, robot.n, callback),)
 
 
@@ -81,10 +81,12 @@ class Differentiated:
         def of_both(function: Callable[..., ArrayLike]) -> TimeConfigurationFunction:
             if of_time and of_configuration:
                 return function
-            return (lambda t, _: function(t)) if of_time else (lambda _, here: function(here))
+            return (lambda t, _: function(t)) if of_time else (lambda _, at: function(at))
 
         self._value = of_both(value)
-        self._value_t, self._value_q = (None if one is None else of_both(one) for one in (value_t, value_q))
+        self._value_t, self._value_q = (
+            None if partial is None else of_both(partial) for partial in (value_t, value_q)
+        )
         self._rows, self._name = rows, name
         self._differs_t = of_time and value_t is None
         self._differs_q = of_configuration and value_q is None
@@ -173,13 +175,13 @@ class CallableFunction(Function):
         self.jacobian = jacobian
         units = ["1"] * len(names) if units is None else units
         angular = [False] * len(names) if angular is None else angular
-        given = {"units": len(units), "angular flags": len(angular)}
+        counts = {"units": len(units), "angular flags": len(angular)}
         sizes: Sequence[float | None] = [None] * len(names)
         if scales is not None:
-            given["scales"] = len(scales)
+            counts["scales"] = len(scales)
             sizes = [positive(scale, "callable function: scale") for scale in scales]
-        even = names and all(count == len(names) for count in given.values())
-        expect(even, "callable function", f"as many {listed(list(given))} as names ({len(names)})", given)
+        even = names and all(count == len(names) for count in counts.values())
+        expect(even, "callable function", f"as many {listed(list(counts))} as names ({len(names)})", counts)
         self._rows = tuple(Row(*row) for row in zip(names, units, angular, sizes, strict=True))
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:

@@ -124,8 +124,10 @@ class LiveNumbers:
 
 
 class Renewal(LiveNumbers, ABC):
-    """Numbers of a stage that a run itself replaces, at a sample, by what there is then. `events` are those
-    of the run: t, s; the task's name; what happened; why."""
+    """A stage's parameters that are updated at samples of a run (by a camera, by replanning).
+
+    `events` are those of the run: t, s; the task's name; what happened; why.
+    """
 
     events: list[tuple[float, str, str, str]]
     #: Whether values jump where the numbers change, as measured ones do.

@@ -76,12 +76,12 @@ class Pursuit(Function):
 
     def limits(self, robot: Robot) -> tuple[tuple[float, float], ...]:
         """(lower, upper) of each c*, rad."""
-        found = []
+        ranges = []
         for pivot in self.axle.pivots:
             lower, upper = robot.q_limits[robot.coordinate(pivot.coordinate)]
             ahead = -pivot.sign * pivot.zero
-            found.append((max(float(lower), ahead - pivot.widest), min(float(upper), ahead + pivot.widest)))
-        return tuple(found)
+            ranges.append((max(float(lower), ahead - pivot.widest), min(float(upper), ahead + pivot.widest)))
+        return tuple(ranges)
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         axle = self.axle

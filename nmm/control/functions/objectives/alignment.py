@@ -40,9 +40,9 @@ def alignment(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
             dy -= at.q[1]
         square = dx * dx + dy * dy
         desired = math.atan2(dy, dx)
-    there = square > 0.0
-    half = math.sin(0.5 * (heading - desired)) if there else 0.0  # 1 - cos x without cancellation
-    slope = math.sin(heading - desired) if there else 0.0
+    apart = square > 0.0
+    half = math.sin(0.5 * (heading - desired)) if apart else 0.0  # 1 - cos x without cancellation
+    slope = math.sin(heading - desired) if apart else 0.0
     rows.value[0] = 2.0 * half * half
     for k in range(-1, n):  # -1: the time
         first = rows.value_t[0] if k < 0 else rows.value_q[0, k]
@@ -52,7 +52,7 @@ def alignment(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
             if numbers[0] == POINT:
                 first -= 1.0 if k == 0 else 0.0
                 second -= 1.0 if k == 1 else 0.0
-            turn = (dx * second - dy * first) / square if there else 0.0
+            turn = (dx * second - dy * first) / square if apart else 0.0
         if k < 0:
             rows.value_t[0] = -slope * turn
         else:
@@ -116,7 +116,7 @@ class Alignment(Objective):
         return (*self._desired.stages(robot), Stage(alignment, min(2, len(rows)), (), numbers))
 
 
-def _function(given: Function | ArrayLike, name: str) -> Function:
-    if isinstance(given, Function):
-        return given
-    return Constant(np.atleast_1d(array(given, name)), "rad" if np.ndim(given) == 0 else "1")
+def _function(value: Function | ArrayLike, name: str) -> Function:
+    if isinstance(value, Function):
+        return value
+    return Constant(np.atleast_1d(array(value, name)), "rad" if np.ndim(value) == 0 else "1")

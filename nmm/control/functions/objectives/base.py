@@ -87,8 +87,8 @@ class Objective(Function):
 
     def _evaluated(self, configuration: Configuration, t: float) -> Evaluation:
         terms = self.terms_on(configuration.robot)
-        found = [(weight, evaluate(function, t, configuration)) for weight, function in terms]
-        parts = ([weight * one[i] for weight, one in found] for i in range(3))
+        evaluations = [(weight, evaluate(function, t, configuration)) for weight, function in terms]
+        parts = ([weight * evaluation[i] for weight, evaluation in evaluations] for i in range(3))
         return Evaluation(*(sum(part[1:], part[0]) for part in parts))
 
     def __add__(self, other: Objective) -> Objective:

@@ -92,9 +92,9 @@ class Clearance(Objective):
 
     def among(self, collisions: Distances) -> Self:
         """This objective with the distances of a controller."""
-        found = copy.copy(self)
-        found.collisions, found._setting = collisions, None
-        return found
+        copied = copy.copy(self)
+        copied.collisions, copied._setting = collisions, None
+        return copied
 
     def __getstate__(self) -> dict[str, Any]:
         """Shapes do not travel: copies make theirs anew."""
@@ -104,18 +104,18 @@ class Clearance(Objective):
         if self.collisions is None:
             raise InputError(where="clearance", expected="collisions, whose obstacles it keeps off", got=None)
         if self._setting is None or self._setting.robot is not robot:
-            given = self.collisions
-            if not self.own and not given.obstacles:
+            collisions = self.collisions
+            if not self.own and not collisions.obstacles:
                 raise InputError(where="clearance", expected="obstacles (own: the robot itself)", got=None)
             self._setting = set_up(
                 robot,
-                given.obstacles,
+                collisions.obstacles,
                 own=self.own,
-                distance=given.distance,
-                band=given.distance + self.reach,
-                ignore=given.ignore,
-                srdf=given.srdf,
-                meshes=given.shapes,
+                distance=collisions.distance,
+                band=collisions.distance + self.reach,
+                ignore=collisions.ignore,
+                srdf=collisions.srdf,
+                meshes=collisions.shapes,
             )
             self._setting.queries.scene.faces[()] = -np.inf  # one row a pair: H is of distances
         return (stage(1, robot.n, _Near(self._setting, self.reach, self.ahead)),)
@@ -137,8 +137,8 @@ class _Near:
         q = configuration.q
         H, H_t, H_q = self._at(t, q)
         for k in range(1, LOOKS + 1 if self._ahead else 1):
-            there, derivative = self._roll(q, self._ahead * k / LOOKS)
-            further, further_t, further_q = self._at(t, there)
+            q_ahead, derivative = self._roll(q, self._ahead * k / LOOKS)
+            further, further_t, further_q = self._at(t, q_ahead)
             n_p = len(derivative)
             further_q[:n_p] = further_q[:n_p] @ derivative
             H, H_t, H_q = H + further / LOOKS, H_t + further_t / LOOKS, H_q + further_q / LOOKS

@@ -148,10 +148,12 @@ class PreferredPosture(Objective):
     def __init__(
         self, posture: Mapping[str, Function | float], weights: Mapping[str, float] | None = None
     ) -> None:
-        given = isinstance(posture, Mapping) and posture
-        expect(given, "posture", 'values of coordinates by name, as in {"q1": 0.5}', posture)
+        by_name = isinstance(posture, Mapping) and posture
+        expect(by_name, "posture", 'values of coordinates by name, as in {"q1": 0.5}', posture)
         self.posture = dict(posture)
-        self.weights = {name: positive(one, f"weights: {name}") for name, one in (weights or {}).items()}
+        self.weights = {
+            name: positive(weight, f"weights: {name}") for name, weight in (weights or {}).items()
+        }
         for name in self.weights:
             expect_known("coordinate", name, self.posture, "weights")
         for name, value in self.posture.items():
@@ -182,8 +184,8 @@ class _OfRanges(Objective):
         limits."""
         own = robot.q_limits[[robot.coordinate(name) for name in joints]]
         low, high = (
-            own[:, k].copy() if given is None else vector(given, len(joints), f"{what}: {name}")
-            for k, (name, given) in enumerate((("lower", self.lower), ("upper", self.upper)))
+            own[:, k].copy() if bound is None else vector(bound, len(joints), f"{what}: {name}")
+            for k, (name, bound) in enumerate((("lower", self.lower), ("upper", self.upper)))
         )
         for name, a, b in zip(joints, low, high, strict=True):
             if not (np.isfinite(a) and np.isfinite(b)):
@@ -228,12 +230,12 @@ def limit_barrier(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     for i in range(1, numbers.shape[0], 3):
         k = int(numbers[i])
         x = (at.q[k] - numbers[i + 1]) / numbers[i + 2]
-        kept = min(max(x, margin), 1.0 - margin)
-        y = 1.0 - kept
-        slope = 0.25 / (y * y) - 0.25 / (kept * kept)
-        curvature = 0.5 / (kept * kept * kept) + 0.5 / (y * y * y)
-        beyond = x - kept
-        rows.value[0] += 0.25 / (kept * y) + beyond * (slope + 0.5 * curvature * beyond)
+        clamped = min(max(x, margin), 1.0 - margin)
+        y = 1.0 - clamped
+        slope = 0.25 / (y * y) - 0.25 / (clamped * clamped)
+        curvature = 0.5 / (clamped * clamped * clamped) + 0.5 / (y * y * y)
+        beyond = x - clamped
+        rows.value[0] += 0.25 / (clamped * y) + beyond * (slope + 0.5 * curvature * beyond)
         rows.value_q[0, k] += (slope + curvature * beyond) / numbers[i + 2]
 
 

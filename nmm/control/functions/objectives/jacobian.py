@@ -159,9 +159,9 @@ def _factors(weights: Weights | None, robot: Robot) -> Array:
     if weights is None:
         return np.ones(robot.n_u)
     if isinstance(weights, Mapping):
-        found = by_name(weights, robot.u_names, robot.groups)
+        values = by_name(weights, robot.u_names, robot.groups)
     else:
-        found = vector(weights, robot.n_u, "weights")
-    for weight, name in zip(found, robot.u_names, strict=True):
+        values = vector(weights, robot.n_u, "weights")
+    for weight, name in zip(values, robot.u_names, strict=True):
         positive(weight, f"weights: {name}")
-    return np.asarray(1.0 / np.sqrt(found))
+    return np.asarray(1.0 / np.sqrt(values))

@@ -175,9 +175,9 @@ def directional_manipulability(at: At, frames: Frames, numbers: Array, rows: Row
     for i in range(s):
         square += rows.value[i] * rows.value[i]
     size = math.sqrt(square)
-    found = decomposed(at, frames, numbers, J_q, J, integer_scratch(s), L, X) and size > 0.0
+    regular = decomposed(at, frames, numbers, J_q, J, integer_scratch(s), L, X) and size > 0.0
     value, rate = 0.0, 0.0
-    if found:
+    if regular:
         square = 0.0
         for j in range(m):
             z[j] = 0.0

@@ -69,8 +69,8 @@ class Circle(Function):
         run_up: float = 0.0,
     ) -> None:
         self.center = vector(center, (2, 3), "center")
-        there = plane == "xy" or (plane in ("yz", "zx") and self.center.size == 3)
-        expect(there, "plane", "xy, or yz or zx with a center of 3 numbers", plane)
+        valid = plane == "xy" or (plane in ("yz", "zx") and self.center.size == 3)
+        expect(valid, "plane", "xy, or yz or zx with a center of 3 numbers", plane)
         self.radius = positive(radius, "radius")
         self.rate = scalar(rate, "rate")
         self.phase = scalar(phase, "phase")

@@ -148,9 +148,9 @@ def rotation_vector(
     >>> nmm.rotation_vector(rpy=[0, 0, 0.5])
     array([0. , 0. , 0.5])
     """
-    given = {"rpy": rpy, "quaternion": quaternion, "matrix": matrix}
-    names = [name for name, value in given.items() if value is not None]
-    expect(len(names) == 1, "orientation", f"one of {', '.join(given)}", names)
+    forms = {"rpy": rpy, "quaternion": quaternion, "matrix": matrix}
+    names = [name for name, value in forms.items() if value is not None]
+    expect(len(names) == 1, "orientation", f"one of {', '.join(forms)}", names)
     phi = np.empty(3)
     if rpy is not None:
         log3(_from_rpy(rpy), phi)
@@ -184,8 +184,8 @@ def _from_quaternion(quaternion: ArrayLike) -> Array:
     )
 
 
-def _rotation(given: ArrayLike) -> Array:
-    R = matrix(given, (3, 3), "matrix")
+def _rotation(value: ArrayLike) -> Array:
+    R = matrix(value, (3, 3), "matrix")
     rotation = np.abs(R.T @ R - np.eye(3)).max() <= SLACK and np.linalg.det(R) >= 0.0
     expect(rotation, "matrix", "a rotation (orthonormal columns, determinant 1)")
     return R
@@ -214,9 +214,9 @@ class PoseReference(Function):
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         rows = []
         for name, unit in (("position", "m"), ("orientation", "rad")):
-            found = getattr(self, name).rows(robot)
-            expect(len(found) == 3, name, f"three components, {unit}", named(found))
-            rows += [Row(row.name, unit) for row in found]
+            components = getattr(self, name).rows(robot)
+            expect(len(components) == 3, name, f"three components, {unit}", named(components))
+            rows += [Row(row.name, unit) for row in components]
         return tuple(rows)
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
@@ -224,5 +224,5 @@ class PoseReference(Function):
         return stacked((self.position, self.orientation), robot)
 
 
-def _three(given: Function | ArrayLike, name: str, unit: str) -> Function:
-    return given if isinstance(given, Function) else Constant(vector(given, 3, name), unit)
+def _three(value: Function | ArrayLike, name: str, unit: str) -> Function:
+    return value if isinstance(value, Function) else Constant(vector(value, 3, name), unit)

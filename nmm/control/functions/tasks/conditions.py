@@ -78,19 +78,19 @@ class While:
         self.lower = infinite(lower, "lower", "a number, or one a row")
         self.upper = infinite(upper, "upper", "a number, or one a row")
         self.margin = scalar(margin, "margin", least=0.0)
-        given = (self.lower, self.upper)
+        bounds = (self.lower, self.upper)
         try:
             above = bool(np.any(self.lower > self.upper))
         except ValueError:
-            raise InputError(where="lower", expected="as many numbers as in upper", got=given) from None
-        expect(not above, "lower", "lower below upper", given)
+            raise InputError(where="lower", expected="as many numbers as in upper", got=bounds) from None
+        expect(not above, "lower", "lower below upper", bounds)
         bound = np.any(np.isfinite(self.lower)) or np.any(np.isfinite(self.upper))
         expect(bound, "lower", "a bound, lower or upper: without one it always holds")
 
 
-def by_unit(given: float | Mapping[str, float] | None, name: str) -> dict[str, float]:
+def by_unit(tolerance: float | Mapping[str, float] | None, name: str) -> dict[str, float]:
     """Numbers above 0 by unit; one for all has the unit ""."""
-    numbers = given if isinstance(given, Mapping) else {} if given is None else {"": given}
+    numbers = tolerance if isinstance(tolerance, Mapping) else {} if tolerance is None else {"": tolerance}
     return {unit: positive(value, f"{name} {unit}".strip()) for unit, value in numbers.items()}
 
 

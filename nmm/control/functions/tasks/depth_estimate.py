@@ -55,8 +55,8 @@ class DepthEstimate:
                 gain = np.linalg.solve(spread, H @ self._spread).T
                 self._state = self._state + gain @ (np.array([x, y]) - seen)
                 self._state[2] = min(max(self._state[2], LEAST / self._first), 1.0 / (LEAST * self._first))
-                kept = np.eye(3) - gain @ H
-                self._spread = kept @ self._spread @ kept.T + self._noise**2 * gain @ gain.T
+                reduction = np.eye(3) - gain @ H
+                self._spread = reduction @ self._spread @ reduction.T + self._noise**2 * gain @ gain.T
         self._t = max(self._t, t)
         x0, y0, inverse = self._state
         return np.asarray(self._c + self._R @ np.array([x0, y0, 1.0]) / inverse)

@@ -31,11 +31,11 @@ def optical_frame(camera: str, robot: Robot) -> str:
     if camera:
         robot.frame_id(camera)
         return camera
-    found = [name for name in robot.frames if OPTICAL in name]
-    if len(found) != 1:
-        got = few(found) if found else "none is called optical"
+    optical = [name for name in robot.frames if OPTICAL in name]
+    if len(optical) != 1:
+        got = few(optical) if optical else "none is called optical"
         raise InputError(where="camera", expected="the name of a camera's frame", got=got)
-    return found[0]
+    return optical[0]
 
 
 class Seen(Function):
@@ -70,8 +70,8 @@ class Seen(Function):
             self.points = (points,)
         else:
             expect(not isinstance(points, str), "points", "a list of points", points)
-            self.points = tuple(as_point(one, "points") for one in points)
-        self.count = sum(len(one) if isinstance(one, Sized) else 1 for one in self.points)
+            self.points = tuple(as_point(point, "points") for point in points)
+        self.count = sum(len(point) if isinstance(point, Sized) else 1 for point in self.points)
         most = "" if math.isinf(self._most) else f", at most {self._most}"
         wanted = f"a list of points, at least {self._least}{most}"
         expect(self._least <= self.count <= self._most, "points", wanted, points)
@@ -96,7 +96,9 @@ class Seen(Function):
 
     def shown(self) -> Shown:
         fx, fy, cx, cy = self.intrinsics.tolist()
-        points = tuple(one for point in self.points for one in getattr(point, "true_points", (point,)))
+        points = tuple(
+            true_point for point in self.points for true_point in getattr(point, "true_points", (point,))
+        )
         others = self._of_others if points == self.points else None  # measured ones are where pictures say
         return Shown(sees=Sight(self.camera, points, self._rows, (fx, fy, cx, cy), self._line, others))
 
@@ -106,10 +108,12 @@ class Seen(Function):
         return another
 
     def undefined(self, robot: Robot, t: float, q: Array) -> str:
-        here = Configuration(robot, q)
+        configuration = Configuration(robot, q)
         camera = optical_frame(self.camera, robot)
-        seen_by = here.placement(camera)
-        points = np.concatenate([evaluate(one, t, here).value for one in self.points]).reshape(-1, 3)
+        seen_by = configuration.placement(camera)
+        points = np.concatenate(
+            [evaluate(function, t, configuration).value for function in self.points]
+        ).reshape(-1, 3)
         for k, point in enumerate(points):
             which = f"point {k + 1} of {self.count}" if self.count > 1 else "the point"
             if not np.isfinite(point).all():

@@ -68,8 +68,8 @@ class LinearCoordinates(Function):
     """
 
     def __init__(self, *combinations: Combination) -> None:
-        given = combinations and all(combinations)
-        expect(given, "coordinates", "one or more, as 'q1' or {'q1': 1, 'q2': -1}")
+        nonempty = combinations and all(combinations)
+        expect(nonempty, "coordinates", "one or more, as 'q1' or {'q1': 1, 'q2': -1}")
         self.combinations = combinations
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:

@@ -137,9 +137,9 @@ class MeasuredPoints(Seen):
         expect(seen.size == 2 * len(self), "values", f"{2 * len(self)} numbers", seen.size)
         far = None if depth is None else each(depth, len(self), "depth")
         camera = self._placed(self._robot)
-        here = Configuration(self._robot, self._robot.q(q)).placement(camera)
+        placement = Configuration(self._robot, self._robot.q(q)).placement(camera)
         at = scalar(t, "t")
-        numbers = self._taken.look(at, seen.reshape(-1, 2), here.rotation, here.translation, far)
+        numbers = self._taken.look(at, seen.reshape(-1, 2), placement.rotation, placement.translation, far)
         self._numbers = numbers
         for live in self._pictures:
             live.set(numbers)
@@ -147,8 +147,8 @@ class MeasuredPoints(Seen):
 
     def __getstate__(self) -> dict[str, object]:
         """Copies are measured by themselves."""
-        kept = {**self.__dict__, "_pictures": None, "_robot": None, "_taken": None}
-        return {**kept, "_numbers": no_points(self.count)}
+        state = {**self.__dict__, "_pictures": None, "_robot": None, "_taken": None}
+        return {**state, "_numbers": no_points(self.count)}
 
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
@@ -157,10 +157,10 @@ class MeasuredPoints(Seen):
 
 def each(depth: ArrayLike, k: int, name: str) -> Array:
     """Depths (k,), m, given for all or one a point."""
-    given = array(depth, name)
-    found = vector(np.full(k, given) if given.ndim == 0 else given, k, name)
-    expect(bool(np.all(found > 0.0)), name, "numbers above 0, m", depth)
-    return found
+    values = array(depth, name)
+    depths = vector(np.full(k, values) if values.ndim == 0 else values, k, name)
+    expect(bool(np.all(depths > 0.0)), name, "numbers above 0, m", depth)
+    return depths
 
 
 def no_points(k: int) -> Array:
@@ -214,8 +214,8 @@ class Pictures(Renewal):
         self._of, self._robot, self._camera = of, robot, camera
         self._true = Program(robot, of.points)
         self._true.lay_out()
-        given = of.faults
-        shift = np.zeros(6) if given.hand_eye is None else vector(given.hand_eye, 6, "hand_eye")
+        faults = of.faults
+        shift = np.zeros(6) if faults.hand_eye is None else vector(faults.hand_eye, 6, "hand_eye")
         self._moved, turned = shift[:3], np.empty((3, 3))
         exp3(shift[3:], turned)
         self._turned = turned
@@ -253,10 +253,10 @@ class Pictures(Renewal):
     def _take(self, t: float, q: Array, real: Array) -> None:
         """Take a picture where the robot is, which is believed to be at q."""
         of, faults = self._of, self._of.faults
-        here = Configuration(self._robot, q).placement(self._camera)
-        there = here if real is q else Configuration(self._robot, real).placement(self._camera)
-        R, c = there.rotation, there.translation
-        P = np.array([one.value for one in self._true.evaluate(t, real)]).reshape(-1, 3)
+        placement = Configuration(self._robot, q).placement(self._camera)
+        true_placement = placement if real is q else Configuration(self._robot, real).placement(self._camera)
+        R, c = true_placement.rotation, true_placement.translation
+        P = np.array([point.value for point in self._true.evaluate(t, real)]).reshape(-1, 3)
         P = (P - (c + R @ self._moved)) @ (R @ self._turned)
         ahead = P[:, 2] > 0.0
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -277,7 +277,7 @@ class Pictures(Renewal):
             self._since = t
         if not lost:
             self._waiting.append(
-                (t + (0.0 if first else faults.latency), t, seen, here.rotation, here.translation)
+                (t + (0.0 if first else faults.latency), t, seen, placement.rotation, placement.translation)
             )
 
     def planned(self, t: Array) -> None:

@@ -50,12 +50,12 @@ def heading(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
         rows.value_q[0, k] = (c * s_q - s * c_q) / square
 
 
-def unit_vector(given: str | ArrayLike, name: str) -> Array:
+def unit_vector(value: str | ArrayLike, name: str) -> Array:
     """An axis by its name, x, y or z, or three numbers, as a unit vector (3,)."""
-    if isinstance(given, str):
-        expect_known(name, given, UNIT, name)
-        given = UNIT[given]
-    direction = nonzero_vector(given, 3, name)
+    if isinstance(value, str):
+        expect_known(name, value, UNIT, name)
+        value = UNIT[value]
+    direction = nonzero_vector(value, 3, name)
     return np.asarray(direction / float(np.linalg.norm(direction)))
 
 

@@ -66,13 +66,13 @@ class Position(PartsOfPose):
         return (Stage(position, len(self.axes), (self.frame,), picked),)
 
 
-def as_point(given: Function | str | ArrayLike, name: str) -> Function:
+def as_point(value: Function | str | ArrayLike, name: str) -> Function:
     """A point of space: a function with 3 rows as it is, a frame's origin by its name, three numbers, m."""
-    if isinstance(given, Function):
-        return given
-    if isinstance(given, str):
-        return Position(given)
-    return Constant(vector(given, 3, name))
+    if isinstance(value, Function):
+        return value
+    if isinstance(value, str):
+        return Position(value)
+    return Constant(vector(value, 3, name))
 
 
 def check_point(point: Function, frame: str, robot: Robot, name: str) -> None:

@@ -85,12 +85,12 @@ class Task:
     def approach(self, robot: Robot) -> tuple[Array, Array]:
         """Speed and braking for the unit of each row, (s,) each; infinite for none."""
         units = [row.unit for row in self.rows(robot)]
-        for name, given in (("speed", self.speed), ("braking", self.braking)):
-            for unit in filter(None, given):
+        for name, values in (("speed", self.speed), ("braking", self.braking)):
+            for unit in filter(None, values):
                 expect_known("unit", unit, sorted(set(units)), name)
         speed, braking = (
-            np.array([given.get(unit, given.get("", np.inf)) for unit in units])
-            for given in (self.speed, self.braking)
+            np.array([values.get(unit, values.get("", np.inf)) for unit in units])
+            for values in (self.speed, self.braking)
         )
         return speed, braking
 
@@ -112,7 +112,7 @@ class Task:
         s = len(rows)
         if self.gain is None:
             return np.zeros((s, s))
-        given = gain = array(self.gain, name)
+        value = gain = array(self.gain, name)
         if gain.ndim == 0:
             gain = gain * np.eye(s)
         elif gain.shape == (s,):
@@ -120,7 +120,7 @@ class Task:
         elif gain.shape != (s, s):
             raise InputError(where=name, expected=f"a number, {s} numbers or a {s} x {s} matrix", got=gain)
         positive_definite = np.linalg.eigvalsh(gain + gain.T).min() > 0.0
-        expect(positive_definite, name, "positive definite (above 0; None for planning mode)", given)
+        expect(positive_definite, name, "positive definite (above 0; None for planning mode)", value)
         return gain
 
 
@@ -139,8 +139,8 @@ class Comparison(Function):
         if kernel is None:
             return ()
         for part in (self.task.function, self.task.reference):
-            found = max(stage.rows for stage in part.stages(robot))
-            expect(found == s, type(part).__name__, f"stages of {s} rows, as many as its components", found)
+            rows = max(stage.rows for stage in part.stages(robot))
+            expect(rows == s, type(part).__name__, f"stages of {s} rows, as many as its components", rows)
         return (Stage(kernel, s, before=2 * s),)
 
 
