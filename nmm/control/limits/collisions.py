@@ -26,10 +26,10 @@ def _refuses_self(cls: type[Collisions]) -> type[Collisions]:
     init = cls.__init__
 
     @wraps(init)
-    def checked(collisions: Collisions, /, *given: Any, **named: Any) -> None:
+    def checked(collisions: Collisions, /, *arguments: Any, **named: Any) -> None:
         if "self" in named:
             raise InputError("it is called self_collisions now", where="collisions: self")
-        init(collisions, *given, **named)
+        init(collisions, *arguments, **named)
 
     cls.__init__ = checked  # type: ignore[method-assign, assignment]  # same signature
     return cls
@@ -96,10 +96,10 @@ class Collisions:
                 expected="True or False",
                 got=self.self_collisions,
             )
-        given = (self.obstacles,) if isinstance(self.obstacles, Obstacle) else tuple(self.obstacles)
-        for one in given:
-            expect_kind(one, Obstacle, "collisions: obstacles", "an Obstacle")
-        names = [one.name for one in given]
+        obstacles = (self.obstacles,) if isinstance(self.obstacles, Obstacle) else tuple(self.obstacles)
+        for obstacle in obstacles:
+            expect_kind(obstacle, Obstacle, "collisions: obstacles", "an Obstacle")
+        names = [obstacle.name for obstacle in obstacles]
         for name in names:
             if names.count(name) > 1:
                 raise InputError(where="collisions: obstacles", expected="a name each", got=name)
@@ -109,7 +109,7 @@ class Collisions:
             raise InputError(where="collisions: band", expected=f"above distance, {distance:g}", got=band)
         expect_known("shapes", self.shapes, (HULLS, CAPSULES), "collisions")
         checked = {
-            "obstacles": given,
+            "obstacles": obstacles,
             "distance": distance,
             "band": band,
             "ignore": tuple(self.ignore),

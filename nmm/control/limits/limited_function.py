@@ -60,14 +60,14 @@ class Bound:
         self.braking = None if braking is None else positive(braking, "braking")
         self.name = name
         self.priority = None if priority is None else counted(priority, "priority")
-        given = (self.lower, self.upper)
+        ends = (self.lower, self.upper)
         bounded = np.isfinite(self.lower).any() or np.isfinite(self.upper).any()
-        expect(bounded, self._who, "lower, upper or both", given)
+        expect(bounded, self._who, "lower, upper or both", ends)
         if self.lower.size in (1, self.upper.size) or self.upper.size == 1:
             if np.any(self.lower > self.upper):
-                raise InputError(where=self._who, expected="lower below upper", got=given)
+                raise InputError(where=self._who, expected="lower below upper", got=ends)
         else:
-            raise InputError(where=self._who, expected="as many numbers in lower as in upper", got=given)
+            raise InputError(where=self._who, expected="as many numbers in lower as in upper", got=ends)
 
     @property
     def _who(self) -> str:

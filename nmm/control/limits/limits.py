@@ -108,7 +108,7 @@ class LimitsOn:
         self.inputs = _velocities(limits.velocity, robot)
         self.coordinates = _positions(limits.position, robot)
         ends = zip(robot.q_names, self.coordinates, strict=True)
-        self.bounded = tuple(name for name, one in ends if np.any(np.isfinite(one)))
+        self.bounded = tuple(name for name, span in ends if np.any(np.isfinite(span)))
         self.changes = _changes_on(limits.acceleration, robot)
         self.accelerations = np.abs(self.changes).min(axis=1)
         self.recovery = limits.recovery
@@ -122,9 +122,11 @@ class LimitsOn:
         bounds = (*held, *(bound for bound in limits.bounds if isinstance(bound, Bound)))
         own = [limit for limit in limits.bounds if isinstance(limit, Limit)]
         self.functions = tuple(bound.function for bound in bounds)
-        found = [(bound, row) for bound in bounds for row in bound.rows(robot)]
-        self._ends = np.array([row[2:] for _, row in found]).reshape(-1, 2)
-        self.braking = np.array([np.nan if bound.braking is None else bound.braking for bound, _ in found])
+        bound_rows = [(bound, row) for bound in bounds for row in bound.rows(robot)]
+        self._ends = np.array([row[2:] for _, row in bound_rows]).reshape(-1, 2)
+        self.braking = np.array(
+            [np.nan if bound.braking is None else bound.braking for bound, _ in bound_rows]
+        )
         self.stages = tuple(checked_stage(limit, robot) for limit in own)
         quantities = [tuple(limit.rows(robot)) for limit in own]
         own_rows = list(zip(self.stages, quantities, strict=True))
@@ -134,32 +136,36 @@ class LimitsOn:
                 RowLimit(name, "rad/s", -spin, spin)
                 for name, spin in zip(wheels, self.spin.tolist(), strict=True)
             ),
-            *(row for _, row in found),
+            *(row for _, row in bound_rows),
         )
         self.first_own = len(self.row_limits)
         names = [row.name for row in self.row_limits]
-        units = [*("rad/s" for _ in wheels), *(f"{row.unit.removesuffix('/s')}/s" for _, row in found)]
+        units = [*("rad/s" for _ in wheels), *(f"{row.unit.removesuffix('/s')}/s" for _, row in bound_rows)]
         self.priorities: tuple[int | None, ...] = (
             *(None for _ in wheels),
-            *(bound.priority for bound, _ in found),
+            *(bound.priority for bound, _ in bound_rows),
         )
-        for limit, stage, kept in zip(own, self.stages, quantities, strict=True):
-            names += [kept[min(i, len(kept) - 1)].name for i in range(stage.rows)]
+        for limit, stage, limited in zip(own, self.stages, quantities, strict=True):
+            names += [limited[min(i, len(limited) - 1)].name for i in range(stage.rows)]
             units += [stage.unit] * stage.rows
             self.priorities += (limit.priority,) * stage.rows
-            self.row_limits += kept
+            self.row_limits += limited
         self.sizes = {
-            row.name: size for stage, kept in own_rows for row, size in zip(kept, stage.sizes, strict=False)
+            row.name: size
+            for stage, limited in own_rows
+            for row, size in zip(limited, stage.sizes, strict=False)
         }
         self.losses = {
-            row.name: loss for stage, kept in own_rows for row, loss in zip(kept, stage.losses, strict=False)
+            row.name: loss
+            for stage, limited in own_rows
+            for row, loss in zip(limited, stage.losses, strict=False)
         }
         self.rows = tuple(names)
         self.rate_units = dict(zip(names, units, strict=True))
         self.needs_dt = bool(
             np.any(np.isfinite(self.accelerations))
             or np.any(np.isfinite(self.coordinates[self._moved[self._moved >= 0]]))
-            or found
+            or bound_rows
             or own
         )
 
@@ -185,13 +191,13 @@ class LimitsOn:
         )
 
 
-def _velocities(given: Named, robot: Robot) -> Array:
+def _velocities(requested: Named, robot: Robot) -> Array:
     largest = robot.u_limits
-    limits = np.column_stack([-largest, largest]) if given is not False else _none(robot.n_u)
-    if isinstance(given, Mapping):
-        mimic_joints = {one.joint: one for one in robot.mimic_joints}
-        for name, inputs in _inputs(given, robot, "velocity", [*mimic_joints]):
-            lower, upper = _ends(given[name], f"velocity: {name}", symmetric=True)
+    limits = np.column_stack([-largest, largest]) if requested is not False else _none(robot.n_u)
+    if isinstance(requested, Mapping):
+        mimic_joints = {mimic.joint: mimic for mimic in robot.mimic_joints}
+        for name, inputs in _inputs(requested, robot, "velocity", [*mimic_joints]):
+            lower, upper = _ends(requested[name], f"velocity: {name}", symmetric=True)
             if name not in mimic_joints:
                 limits[inputs] = lower, upper
             elif mimic_joints[name].multiplier:
@@ -207,12 +213,14 @@ def _velocities(given: Named, robot: Robot) -> Array:
     return limits
 
 
-def _positions(given: Named, robot: Robot) -> Array:
+def _positions(requested: Named, robot: Robot) -> Array:
     limits = (
-        np.where(robot.limited, robot.q_limits, [-np.inf, np.inf]) if given is not False else _none(robot.n)
+        np.where(robot.limited, robot.q_limits, [-np.inf, np.inf])
+        if requested is not False
+        else _none(robot.n)
     )
-    if isinstance(given, Mapping):
-        for name, value in given.items():
+    if isinstance(requested, Mapping):
+        for name, value in requested.items():
             try:
                 i = robot.independent(name)
             except InputError as error:
@@ -222,47 +230,47 @@ def _positions(given: Named, robot: Robot) -> Array:
     return np.asarray(limits)
 
 
-def _changes_on(given: Range | Mapping[str, Range] | None, robot: Robot) -> Array:
-    found = _none(robot.n_u)
-    if isinstance(given, Mapping):
-        for name, inputs in _inputs(given, robot, "acceleration"):
-            found[inputs] = _change(given[name], name)
-    elif given is not None:
-        found[:] = _change(given, "acceleration")
-    return found
+def _changes_on(requested: Range | Mapping[str, Range] | None, robot: Robot) -> Array:
+    changes = _none(robot.n_u)
+    if isinstance(requested, Mapping):
+        for name, inputs in _inputs(requested, robot, "acceleration"):
+            changes[inputs] = _change(requested[name], name)
+    elif requested is not None:
+        changes[:] = _change(requested, "acceleration")
+    return changes
 
 
 def _inputs(
-    given: Mapping[str, object], robot: Robot, what: str, mimic_joints: Sequence[str] = ()
+    requested: Mapping[str, object], robot: Robot, what: str, mimic_joints: Sequence[str] = ()
 ) -> list[tuple[str, list[int]]]:
     """The inputs of each name: groups first, then inputs, then mimic joints, so that later ones override."""
-    leaders = {one.joint: one.leader for one in robot.mimic_joints if one.joint in mimic_joints}
+    leaders = {mimic.joint: mimic.leader for mimic in robot.mimic_joints if mimic.joint in mimic_joints}
     known = [*robot.groups, *robot.u_names, *leaders]
-    for name in given:
+    for name in requested:
         robot.expect_unlocked(name)
         expect_known(f"input{', joint that follows another' if leaders else ''} or group", name, known, what)
-    found = []
-    for name in sorted(given, key=lambda name: (name not in robot.groups, name in leaders)):
+    by_name = []
+    for name in sorted(requested, key=lambda name: (name not in robot.groups, name in leaders)):
         of = robot.groups.get(name, (leaders.get(name, name),))
-        found.append((name, [robot.input(one) for one in of]))
-    return found
+        by_name.append((name, [robot.input(member) for member in of]))
+    return by_name
 
 
 def _wheel_limits(limits: Limits, robot: Robot) -> tuple[tuple[str, ...], Array, Array]:
-    given = limits.wheels
+    requested = limits.wheels
     names, rows = wheel_rates(robot)
-    if given is not None and not names:
+    if requested is not None and not names:
         raise InputError(f"{robot.name} has none on its main body whose rates are known", where="wheels")
     own = {wheel.joint: wheel.velocity for wheel in robot.wheels}
     speeds = np.array([np.inf if limits.velocity is False else own[name] for name in names])
-    if isinstance(given, Mapping):
-        for name, speed in given.items():
+    if isinstance(requested, Mapping):
+        for name, speed in requested.items():
             expect_known("wheel", name, names, "wheels")
             speeds[names.index(name)] = speed
-    elif given is not None:
-        speeds[:] = given
-    kept = np.flatnonzero(np.isfinite(speeds))
-    return tuple(names[i] for i in kept), rows[kept], speeds[kept]
+    elif requested is not None:
+        speeds[:] = requested
+    limited = np.flatnonzero(np.isfinite(speeds))
+    return tuple(names[i] for i in limited), rows[limited], speeds[limited]
 
 
 def _none(count: int) -> Array:
@@ -296,8 +304,8 @@ def _named(value: Named, name: str) -> Named:
 
 def _changes(value: Range | Mapping[str, Range] | None) -> Range | Mapping[str, Range] | None:
     if isinstance(value, Mapping):
-        found = {key: _change(item, f"acceleration: {key}") for key, item in value.items()}
-        return {key: _as_given(*ends) for key, ends in found.items()}
+        changes = {key: _change(item, f"acceleration: {key}") for key, item in value.items()}
+        return {key: _as_given(*ends) for key, ends in changes.items()}
     return None if value is None else _as_given(*_change(value, "acceleration"))
 
 

@@ -179,9 +179,9 @@ def write_edges(frames: Frames, numbers: Array, edges: Array) -> None:
     on it is along the normal from the main body's origin, m."""
     base, corners, first = frames.placements[frames.slots[0]], int(numbers[4]), HEAD + BODY * int(numbers[3])
     for k in range(corners):
-        here, there = first + 2 * k, first + 2 * ((k + 1) % corners)
-        x, y = numbers[here], numbers[here + 1]
-        n_x, n_y = y - numbers[there + 1], numbers[there] - x
+        corner, next_corner = first + 2 * k, first + 2 * ((k + 1) % corners)
+        x, y = numbers[corner], numbers[corner + 1]
+        n_x, n_y = y - numbers[next_corner + 1], numbers[next_corner] - x
         length = math.sqrt(n_x * n_x + n_y * n_y)
         edges[k, 0] = (base[0, 0] * n_x + base[0, 1] * n_y) / length
         edges[k, 1] = (base[1, 0] * n_x + base[1, 1] * n_y) / length
@@ -366,5 +366,5 @@ def _inner_radius(corners: Array) -> float:
     along = np.roll(corners, -1, axis=0) - corners
     normals = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.hypot(*along.T)[:, np.newaxis]
     A = np.hstack([-normals, np.ones((len(corners), 1))])
-    found = linprog([0.0, 0.0, -1.0], A, -np.sum(normals * corners, axis=1), bounds=[(None, None)] * 3)
-    return float(np.asarray(found.x)[2])
+    solution = linprog([0.0, 0.0, -1.0], A, -np.sum(normals * corners, axis=1), bounds=[(None, None)] * 3)
+    return float(np.asarray(solution.x)[2])
