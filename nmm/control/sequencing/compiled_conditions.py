@@ -47,7 +47,7 @@ class Conditions(NamedTuple):
 _FLAT, _CONDITIONS = float64[::1], record_type(Conditions)
 
 #: t, q (n,), the program's blocks, the conditions, active tasks, the memory, and the memory to write.
-LOOK = void(float64, _FLAT, int64[::1], _FLAT, _CONDITIONS, boolean[::1], _FLAT, _FLAT)
+EVALUATE = void(float64, _FLAT, int64[::1], _FLAT, _CONDITIONS, boolean[::1], _FLAT, _FLAT)
 
 #: times (N,), q (N, n), the program's blocks, the conditions, tasks that are active and over, the memory,
 #: and the previous memory to write.
@@ -58,27 +58,27 @@ WATCH = int64(
 
 
 @compiled
-def square_error(value: Array, those: Conditions, i: int, last: int) -> float:
+def square_error(value: Array, table: Conditions, i: int, last: int) -> float:
     """‖e‖² over the rows up to `last` of the unit whose first row is i."""
     square = 0.0
     for j in range(i, last):
-        if those.rows[j, 3] == i:
-            error = value[those.rows[j, 1]] - value[those.rows[j, 0]]
-            if those.rows[j, 2] >= 0:
-                error = value[those.rows[j, 2]]
-            elif those.rows[j, 2] == WRAPPED:
+        if table.rows[j, 3] == i:
+            error = value[table.rows[j, 1]] - value[table.rows[j, 0]]
+            if table.rows[j, 2] >= 0:
+                error = value[table.rows[j, 2]]
+            elif table.rows[j, 2] == WRAPPED:
                 error = math.pi - (math.pi - error) % (2.0 * math.pi)
             square += error * error
     return square
 
 
 @compiled
-def look(
+def evaluate_conditions(
     t: float,
     q: Array,
     integers: Integers,
     floats: Array,
-    those: Conditions,
+    table: Conditions,
     active: Flags,
     memory: Array,
     now: Array,
@@ -87,27 +87,27 @@ def look(
     Pinocchio and of users' Python functions are in the program's blocks already."""
     run_program(t, q, integers, floats)
     value = views(LaidOut, integers, floats, 0).buffers.value
-    for c in range(those.kinds.shape[0]):
+    for c in range(table.kinds.shape[0]):
         was, within = memory[c], True
-        start, last = those.first[c], those.first[c + 1]
-        if those.kinds[c] == BETWEEN:
-            within = those.numbers[c, 0] - SAME <= t < those.numbers[c, 1] - SAME
-        elif those.kinds[c] == WHILE:
-            wider = those.numbers[c, 0] if was == 1.0 else 0.0
+        start, last = table.first[c], table.first[c + 1]
+        if table.kinds[c] == BETWEEN:
+            within = table.numbers[c, 0] - SAME <= t < table.numbers[c, 1] - SAME
+        elif table.kinds[c] == WHILE:
+            wider = table.numbers[c, 0] if was == 1.0 else 0.0
             for i in range(start, last):
-                x = value[those.rows[i, 0]]
-                within = within and those.bounds[i, 0] - wider <= x and x <= those.bounds[i, 1] + wider
+                x = value[table.rows[i, 0]]
+                within = within and table.bounds[i, 0] - wider <= x and x <= table.bounds[i, 1] + wider
         else:
             for i in range(start, last):
-                if those.rows[i, 3] == i:
-                    within = within and math.sqrt(square_error(value, those, i, last)) <= those.bounds[i, 1]
+                if table.rows[i, 3] == i:
+                    within = within and math.sqrt(square_error(value, table, i, last)) <= table.bounds[i, 1]
             if was == -math.inf:
                 now[c] = was
-            elif not (active[those.watched[c]] and within):
+            elif not (active[table.watched[c]] and within):
                 now[c] = math.nan
             else:
                 since = t if math.isnan(was) else was
-                now[c] = -math.inf if t - since >= those.numbers[c, 0] - SAME else since
+                now[c] = -math.inf if t - since >= table.numbers[c, 0] - SAME else since
             continue
         now[c] = 1.0 if within else 0.0
 
@@ -118,7 +118,7 @@ def watch(
     q: Array,
     integers: Integers,
     floats: Array,
-    those: Conditions,
+    table: Conditions,
     active: Flags,
     over: Flags,
     memory: Array,
@@ -126,15 +126,15 @@ def watch(
 ) -> int:
     """The number of samples before the active tasks change; memory and before (c,) become those after the
     last of these samples and after the one before it."""
-    n, count = q.shape[1], those.kinds.shape[0]
+    n, count = q.shape[1], table.kinds.shape[0]
     now = scratch(count)
     for k in range(times.shape[0]):
-        look(times[k], view(q, k * n, (n,)), integers, floats, those, active, memory, now)
+        evaluate_conditions(times[k], view(q, k * n, (n,)), integers, floats, table, active, memory, now)
         for task in range(active.shape[0]):
             wanted = not over[task]
             for c in range(count):
-                held = now[c] == (-math.inf if those.kinds[c] == AFTER else 1.0)
-                wanted = wanted and (those.tasks[c] != task or held)
+                held = now[c] == (-math.inf if table.kinds[c] == AFTER else 1.0)
+                wanted = wanted and (table.tasks[c] != task or held)
             if wanted != active[task]:
                 return k
         for c in range(count):
@@ -143,7 +143,7 @@ def watch(
 
 
 def conditions(
-    given: Sequence[tuple[int, Condition]],
+    numbered: Sequence[tuple[int, Condition]],
     watched: Mapping[str, tuple[int, Task]],
     robot: Robot,
     first_rows: Sequence[int],
@@ -154,15 +154,15 @@ def conditions(
     first_rows : where f, g and e of each of these begin, then the function of each WHILE
     """
     kinds = [
-        BETWEEN if isinstance(one, Between) else AFTER if isinstance(one, After) else WHILE
-        for _, one in given
+        BETWEEN if isinstance(condition, Between) else AFTER if isinstance(condition, After) else WHILE
+        for _, condition in numbered
     ]
     table = Conditions(
         kinds=np.array(kinds, dtype=np.int64),
-        tasks=np.array([i for i, _ in given], dtype=np.int64),
-        watched=np.zeros(len(given), dtype=np.int64),
-        first=np.zeros(len(given) + 1, dtype=np.int64),
-        numbers=np.zeros((len(given), 2)),
+        tasks=np.array([i for i, _ in numbered], dtype=np.int64),
+        watched=np.zeros(len(numbered), dtype=np.int64),
+        first=np.zeros(len(numbered) + 1, dtype=np.int64),
+        numbers=np.zeros((len(numbered), 2)),
         rows=np.zeros((0, 4), dtype=np.int64),
         bounds=np.zeros((0, 2)),
     )
@@ -170,23 +170,23 @@ def conditions(
     bounds: list[tuple[float, float]] = []
     begins = {name: first_rows[3 * k : 3 * k + 3] for k, name in enumerate(watched)}
     whiles = iter(first_rows[3 * len(watched) :])
-    for c, (_, one) in enumerate(given):
+    for c, (_, condition) in enumerate(numbered):
         first = len(rows)
-        if isinstance(one, Between):
-            table.numbers[c] = one.start, one.end
-        elif isinstance(one, After):
-            (table.watched[c], task), (f, g, e) = watched[one.task], begins[one.task]
-            table.numbers[c, 0] = one.hold
+        if isinstance(condition, Between):
+            table.numbers[c] = condition.start, condition.end
+        elif isinstance(condition, After):
+            (table.watched[c], task), (f, g, e) = watched[condition.task], begins[condition.task]
+            table.numbers[c, 0] = condition.hold
             own = task.rows(robot)
             units = [row.unit for row in own]
             for j, row in enumerate(own):
                 rows.append((f + j, g + j, error_row(task, e + j, row), first + units.index(row.unit)))
-                bounds.append((0.0, one.within.get(row.unit, one.within.get("", math.inf))))
+                bounds.append((0.0, condition.within.get(row.unit, condition.within.get("", math.inf))))
         else:
-            begin, count = next(whiles), len(one.function.rows(robot))
-            table.numbers[c, 0] = one.margin
+            begin, count = next(whiles), len(condition.function.rows(robot))
+            table.numbers[c, 0] = condition.margin
             rows += [(begin + j, 0, 0, 0) for j in range(count)]
-            lower, upper = (np.broadcast_to(bound, count) for bound in (one.lower, one.upper))
+            lower, upper = (np.broadcast_to(bound, count) for bound in (condition.lower, condition.upper))
             bounds += zip(lower.tolist(), upper.tolist(), strict=True)
         table.first[c + 1] = len(rows)
     return table._replace(

@@ -15,7 +15,7 @@ from nmm.base.kernels.compiled import checked_by_caller
 from nmm.control.functions.program import COMPILED, Program
 from nmm.control.functions.tasks.conditions import After, Between, Condition, While
 from nmm.control.functions.tasks.task import Stack
-from nmm.control.sequencing.compiled_conditions import LOOK, WATCH, conditions, look, watch
+from nmm.control.sequencing.compiled_conditions import EVALUATE, WATCH, conditions, evaluate_conditions, watch
 from nmm.control.step.task_rows import task_functions
 from nmm.model.robots.robot import Robot
 
@@ -77,36 +77,36 @@ class Sequence:
         for name in named:
             if named.count(name) > 1:
                 raise InputError(where="name", expected="another name for each task", got=name)
-        self._conditions = [(i, one) for i, task in enumerate(stack) for one in task.when]
-        for i, one in self._conditions:
-            if isinstance(one, After):
-                expect_known("task name", one.task, named, f"task {self.names[i]}: when: after")
-            if isinstance(one, While):
-                _check_rows(one, robot, f"task {self.names[i]}: when: while")
+        self._conditions = [(i, condition) for i, task in enumerate(stack) for condition in task.when]
+        for i, condition in self._conditions:
+            if isinstance(condition, After):
+                expect_known("task name", condition.task, named, f"task {self.names[i]}: when: after")
+            if isinstance(condition, While):
+                _check_rows(condition, robot, f"task {self.names[i]}: when: while")
         self._refuse_circles()
-        afters = [one for _, one in self._conditions if isinstance(one, After)]
-        self._after = {one.task: self.names.index(one.task) for one in afters}
-        for i, one in self._conditions:
-            if isinstance(one, After):
-                units = sorted({row.unit for row in self.tasks[self._after[one.task]].rows(robot)})
-                for unit in one.within:
+        afters = [condition for _, condition in self._conditions if isinstance(condition, After)]
+        self._after = {condition.task: self.names.index(condition.task) for condition in afters}
+        for i, condition in self._conditions:
+            if isinstance(condition, After):
+                units = sorted({row.unit for row in self.tasks[self._after[condition.task]].rows(robot)})
+                for unit in condition.within:
                     if unit:
                         expect_known("unit", unit, units, f"task {self.names[i]}: when: after: within")
         self._robot = robot
         watched = {name: (i, self.tasks[i]) for name, i in self._after.items()}
         waited_for = Stack(tuple(task for _, task in watched.values()))
-        functions = [one.function for _, one in self._conditions if isinstance(one, While)]
+        functions = [condition.function for _, condition in self._conditions if isinstance(condition, While)]
         # Compiled, so that `pass_over` and `next` agree to the last digit.
         self._program = Program(robot, [*task_functions(waited_for), *functions], COMPILED)
         self._program.lay_out()
         self._table = conditions(self._conditions, watched, robot, self._program.first_rows)
         none = (False,) * len(self.tasks)
-        memory = tuple(math.nan if isinstance(one, After) else 0.0 for _, one in self._conditions)
+        memory = tuple(math.nan if isinstance(condition, After) else 0.0 for _, condition in self._conditions)
         self.start = Moment(-math.inf, none, memory, none, none)
 
     def _refuse_circles(self) -> None:
         waits = {
-            self.names[i]: [one.task for one in task.when if isinstance(one, After)]
+            self.names[i]: [condition.task for condition in task.when if isinstance(condition, After)]
             for i, task in enumerate(self.tasks)
         }
 
@@ -147,7 +147,7 @@ class Sequence:
         q, room = np.array(q, dtype=np.float64), np.empty(len(self._conditions))
         self._program.prepare(t, q)
         known = self._table, np.array(before.active), np.array(before.memory)
-        checked_by_caller(look, LOOK)(t, q, *self._program.blocks, *known, room)
+        checked_by_caller(evaluate_conditions, EVALUATE)(t, q, *self._program.blocks, *known, room)
         memory = (*room.tolist(),)
         holds = self._held(memory)
         wanted = [
@@ -156,9 +156,9 @@ class Sequence:
             for i in range(len(self.tasks))
         ]
         over, replaced = list(before.over), {}
-        for i, one in self._conditions:
-            if isinstance(one, After) and one.instead and wanted[i] and not before.begun[i]:
-                replaced[self._after[one.task]] = i
+        for i, condition in self._conditions:
+            if isinstance(condition, After) and condition.instead and wanted[i] and not before.begun[i]:
+                replaced[self._after[condition.task]] = i
         for i in replaced:
             wanted[i], over[i] = False, True
         events = []
@@ -169,8 +169,8 @@ class Sequence:
                 why = f"{self.names[replaced[i]]} begins instead of it"
             else:
                 changed = [
-                    self._words(one, now)
-                    for (j, one), held, earlier in zip(
+                    self._words(condition, now)
+                    for (j, condition), held, earlier in zip(
                         self._conditions, holds, self._held(before.memory), strict=True
                     )
                     if i == j and held == now and (held != earlier or math.isinf(before.t))
@@ -186,37 +186,43 @@ class Sequence:
 
     def never_began(self, moment: Moment) -> list[Finding]:
         """The tasks whose conditions never held together, with the conditions that do not hold now."""
-        found = []
+        findings = []
         for i, name in enumerate(self.names):
             if not moment.begun[i]:
                 missing = [
-                    self._words(one, now=False)
-                    for (j, one), held in zip(self._conditions, self._held(moment.memory), strict=True)
+                    self._words(condition, now=False)
+                    for (j, condition), held in zip(self._conditions, self._held(moment.memory), strict=True)
                     if i == j and not held
                 ]
-                found.append(Finding("task_never_began", {"task": name, "missing": missing}))
-        return found
+                findings.append(Finding("task_never_began", {"task": name, "missing": missing}))
+        return findings
 
     def _held(self, memory: Several[float]) -> list[bool]:
         pairs = zip(self._conditions, memory, strict=True)
-        return [now == (-math.inf if isinstance(one, After) else 1.0) for (_, one), now in pairs]
+        return [now == (-math.inf if isinstance(condition, After) else 1.0) for (_, condition), now in pairs]
 
-    def _words(self, one: Condition, now: bool) -> str:
-        if isinstance(one, Between):
-            time = f"t = {one.start:g} s" if math.isinf(one.end) else f"t = {one.start:g} to {one.end:g} s"
+    def _words(self, condition: Condition, now: bool) -> str:
+        if isinstance(condition, Between):
+            time = (
+                f"t = {condition.start:g} s"
+                if math.isinf(condition.end)
+                else f"t = {condition.start:g} to {condition.end:g} s"
+            )
             return f"its time is {time}"
-        if isinstance(one, While):
-            rows = ", ".join(row.name for row in one.function.rows(self._robot))
+        if isinstance(condition, While):
+            rows = ", ".join(row.name for row in condition.function.rows(self._robot))
             ends = [
                 f"{word} {', '.join(f'{x:g}' for x in bound.tolist())}"
-                for word, bound in (("at least", one.lower), ("at most", one.upper))
+                for word, bound in (("at least", condition.lower), ("at most", condition.upper))
                 if np.any(np.isfinite(bound))
             ]
             return f"{rows} is {'' if now else 'not '}{' and '.join(ends)}"
-        sizes = ", ".join(f"{value:g} {unit}".strip() for unit, value in one.within.items())
-        if one.hold == 0.0:
-            return f"{one.task} {'came' if now else 'did not come'} within {sizes}"
-        return f"{one.task} {'stayed' if now else 'did not stay'} within {sizes} for {one.hold:g} s"
+        sizes = ", ".join(f"{value:g} {unit}".strip() for unit, value in condition.within.items())
+        if condition.hold == 0.0:
+            return f"{condition.task} {'came' if now else 'did not come'} within {sizes}"
+        return (
+            f"{condition.task} {'stayed' if now else 'did not stay'} within {sizes} for {condition.hold:g} s"
+        )
 
 
 class Schedule:
@@ -271,7 +277,7 @@ class Schedule:
         return self.moment
 
 
-def _check_rows(one: While, robot: Robot, where: str) -> None:
-    rows = len(one.function.rows(robot))
-    for name, bound in (("lower", one.lower), ("upper", one.upper)):
+def _check_rows(condition: While, robot: Robot, where: str) -> None:
+    rows = len(condition.function.rows(robot))
+    for name, bound in (("lower", condition.lower), ("upper", condition.upper)):
         expect(len(bound) in (1, rows), f"{where}: {name}", f"a number, or {rows}, one a row", len(bound))
