@@ -69,7 +69,7 @@ def main() -> None:
         if controller.solver.scene is not None and controller.safety_filter is not None:
             scene = controller.solver.scene.queries.scene
             looked = "yes" if controller.safety_filter.held else "no"
-            rows = int(controller.solver.found.near.used)
+            rows = int(controller.solver.step_memory.near.used)
             counts = f"{len(scene.pairs):7}{int(scene.active.sum()):6}{rows:6}{looked:>8}"
         best = min(times[name])
         print(f"{name:12}{counts:27}{best:8.1f}{best / min(times['none']):7.2f}{aim or '':>6}")

@@ -16,7 +16,7 @@ from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.text_format import listed
 from nmm.control.functions.function import Row
 from nmm.control.functions.objectives.base import Objective
-from nmm.control.functions.program import PINOCCHIO, nothing
+from nmm.control.functions.program import PINOCCHIO, no_preparation
 from nmm.control.functions.tasks.task import Stack, Task
 from nmm.control.integrators import STEPPING
 from nmm.control.limits.collisions import Collisions
@@ -31,7 +31,7 @@ from nmm.control.step.idle_inputs import idle_inputs, inputs_without_effect
 from nmm.control.step.limit_report import LimitReport
 from nmm.control.step.safety_filter import SafetyFilter
 from nmm.control.step.step import Step
-from nmm.control.step.step_layout import SERVO, Given, checked
+from nmm.control.step.step_layout import SERVO, ControllerArguments, checked
 from nmm.control.step.step_solver import FAILED, StepSolver
 from nmm.control.step.stepping import ADVANCE, advance, tableau
 from nmm.model.robots.robot import Robot
@@ -109,25 +109,27 @@ class Controller:
         servo: float = SERVO,
     ) -> None:
         added = Stack() if added_task is None else Stack.of(added_task)
-        given = (robot, Stack.of(task), resolver, objective, added)
+        arguments = (robot, Stack.of(task), resolver, objective, added)
         self.given = checked(
-            Given(*given, limits, dt, retreat, steering, collisions, kinematics, order, servo)
+            ControllerArguments(
+                *arguments, limits, dt, retreat, steering, collisions, kinematics, order, servo
+            )
         )
-        for one in (*self.given.task, *added):
-            if one.when:
-                raise InputError("is for a SequencedController", where=f"task {one.called(robot)}: when")
+        for part in (*self.given.task, *added):
+            if part.when:
+                raise InputError("is for a SequencedController", where=f"task {part.called(robot)}: when")
         law = Steering() if steering is True else steering
         solver = self.solver = StepSolver(self.given, law.on(robot, self.given.task) if law else None)
-        solver.choose_steering(self._unfelt)
-        self._u, self._q_dot, self._shape = solver.found.answer.u, solver.found.q_dot, (robot.n,)
+        solver.choose_steering(self._steering_unused)
+        self._u, self._q_dot, self._shape = solver.step_memory.answer.u, solver.step_memory.q_dot, (robot.n,)
         if order == 2:
-            self._u = solver.found.second.u_dot
+            self._u = solver.step_memory.second.u_dot
         self._busy, self._at_hand, self._needs_dt = solver.busy, solver.at_hand, solver.needs_dt
         self._steppers: dict[str, Callable[[float, Array, float], tuple[Array, Array]]] = {}
         self.dt = dt
         self.reset()
 
-    def _unfelt(self, law: Steered) -> bool:
+    def _steering_unused(self, law: Steered) -> bool:
         """Whether nothing uses the inputs of the law, and the task moves the platform by other inputs."""
         idle = {*idle_inputs(self.solver)}
         platform = {*self.given.robot.groups["platform"]}
@@ -192,7 +194,7 @@ class Controller:
         return type(self), tuple(self.given._replace(dt=self.dt))
 
     def with_arguments(self, **arguments: Any) -> Self:
-        """A new controller with other arguments (`Given`), without what this one remembers."""
+        """A new controller with other arguments (`ControllerArguments`), without what this one remembers."""
         return type(self)(*self.given._replace(**{"dt": self.dt, **arguments}))
 
     @property
@@ -271,12 +273,12 @@ class Controller:
         [0.4, 0.3, 0.2, 0.1, 0.0, 0.0]
         """
         solver, q = self.solver, self.robot.q(q)
-        with solver.alone():
+        with solver.exclusive():
             if u is not None:
                 self._move(u)
             solver.take_stop(scalar(t, "t"), q)
             solver.period_monitor.called[()] = t
-            return (solver.found.second.u_dot if solver.second else solver.found.answer.u).copy()
+            return (solver.step_memory.second.u_dot if solver.second else solver.step_memory.answer.u).copy()
 
     def _move(self, u: ArrayLike) -> None:
         """The robot moves with the inputs u (m,)."""
@@ -332,10 +334,10 @@ class Controller:
                 expected="zoh",
                 got=method,
             )
-        found, prepare, ideal = tableau(plain), solver.program.prepare, Plant(plain).under(self)
-        stages = found is None or len(found.weights) > 1
+        butcher, prepare, ideal = tableau(plain), solver.program.prepare, Plant(plain).under(self)
+        stages = butcher is None or len(butcher.weights) > 1
         # What Python prepares is valid at (t, q) only, but methods with stages evaluate elsewhere, too.
-        if found is None or (stages and prepare is not nothing) or not solver.compiles_steps:
+        if butcher is None or (stages and prepare is not no_preparation) or not solver.compiles_steps:
 
             def from_python(t: float, q: Array, dt: float) -> tuple[Array, Array]:
                 answer, q_dot = self(t, q), self._q_dot.copy()
@@ -354,10 +356,10 @@ class Controller:
         n, m = self.robot.n, self.robot.n_u
 
         def compiled(t: float, q: Array, dt: float) -> tuple[Array, Array]:
-            with solver.alone():
+            with solver.exclusive():
                 prepare(t, q)
                 q_next, u = np.empty(n), np.empty(m)
-                if run(t, dt, q, *blocks, found, q_next, u) >= FAILED:
+                if run(t, dt, q, *blocks, butcher, q_next, u) >= FAILED:
                     raise solver.failure(t, q)
             return q_next, u
 
@@ -372,7 +374,7 @@ class Controller:
         solver = self.solver
         solver.expect_dt()
         q = self._copied(q)
-        with solver.alone(), solver.sample.aside():
+        with solver.exclusive(), solver.sample.preserve_state():
             if u is not None:
                 self._move(u)
             solver.solve_whole(float(t), q)

@@ -36,14 +36,14 @@ def readable_basis(basis: Array) -> Array:
     space spanned by axes thus gets these axes; each row's largest component is positive.
     """
     projector = basis.T @ basis
-    found = np.zeros_like(basis)
+    readable = np.zeros_like(basis)
     for row in range(len(basis)):
         axis = int(np.argmax(np.round(np.diag(projector), 12)))  # the first of equals, despite rounding
         direction = projector[axis] / np.linalg.norm(projector[axis])
         direction /= np.linalg.norm(direction)
-        found[row] = direction
+        readable[row] = direction
         projector = projector - np.outer(direction, direction)
-    return found
+    return readable
 
 
 def direction_text(direction: Array, names: Sequence[str]) -> str:
@@ -122,14 +122,14 @@ def in_world_axes(J: Array, task: Stack, robot: Robot, q: ArrayLike) -> Array:
     rows of that velocity in world axes replace them; they lose rank together. All other rows stay, also those
     relative to another frame.
     """
-    here = Configuration(robot, q)
+    configuration = Configuration(robot, q)
     turned = J.copy()
     first = 0
-    for one in task:
-        function = one.function
+    for part in task:
+        function = part.function
         rows = len(function.rows(robot))
         if isinstance(function, Pose | Orientation) and function.relative_to is None:
-            turned[first : first + rows] = (here.jacobian(function.frame) @ here.S)[-rows:]
+            turned[first : first + rows] = (configuration.jacobian(function.frame) @ configuration.S)[-rows:]
         first += rows
     return turned
 
@@ -151,11 +151,11 @@ def failure(
     if status is Status.NOT_FINITE:
         parts = (J, problem.rate, problem.h, problem.limit_rows)
         finite = all(np.isfinite(part).all() for part in parts)
-        functions = [*(one.function for one in task), *limited]
+        functions = [*(part.function for part in task), *limited]
         values["undefined"] = (
             "the resolver's answer, though J, rate and h are finite"
             if finite
-            else next(filter(None, (one.undefined(robot, t, q) for one in functions)), "")
+            else next(filter(None, (function.undefined(robot, t, q) for function in functions)), "")
             or "the task, its reference, the objective or a limit is undefined here"
         )
     elif status is Status.SINGULAR_J and np.all(np.isfinite(J)):
@@ -165,8 +165,8 @@ def failure(
             if lost := lost_directions(turned[:end], rows[:end], scales[:end]):
                 values["lost"] = lost
                 if level:
-                    priority = sorted({one.priority for one in task})[level]
-                    names = [one.called(robot) for one in task if one.priority == priority]
+                    priority = sorted({part.priority for part in task})[level]
+                    names = [part.called(robot) for part in task if part.priority == priority]
                     values |= {"level": priority, "tasks": names}
                 break
     if (problematic := robot.platform.problem(q[: robot.platform.n_p])) is not None:

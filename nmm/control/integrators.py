@@ -216,11 +216,11 @@ STEPPING = METHODS[:-1]
 def integrator(method: str, robot: Robot, tolerance: float) -> Integrator:
     """The integrator of that name; `InputError` lists the names."""
     expect_known("method", method, METHODS)
-    found: Integrator
+    chosen: Integrator
     if method in ("zoh", "zoh_midpoint"):
-        found = ZeroOrderHold(robot, at_middle=method == "zoh_midpoint")
+        chosen = ZeroOrderHold(robot, at_middle=method == "zoh_midpoint")
     elif method == "adaptive":
-        found = Adaptive(tolerance)
+        chosen = Adaptive(tolerance)
     else:
-        found = {"rk4": RK4, "midpoint": MIDPOINT, "euler": EULER}[method]
-    return WithMimicJoints(found, robot) if robot.mimic_joints else found
+        chosen = {"rk4": RK4, "midpoint": MIDPOINT, "euler": EULER}[method]
+    return WithMimicJoints(chosen, robot) if robot.mimic_joints else chosen

@@ -182,9 +182,9 @@ class Guarded(Around):
         """Other inputs than the sample's are not checked: they are taken where nothing is near."""
         if self.safety_filter.held:
             return u
-        found = self.integrator.inputs(stage, t, q, q_dot, u, dt)
-        near = found is not u and not self.safety_filter.clear(np.abs(self.held(q, found, dt) - q).sum())
-        return u if near else found
+        inputs = self.integrator.inputs(stage, t, q, q_dot, u, dt)
+        near = inputs is not u and not self.safety_filter.clear(np.abs(self.held(q, inputs, dt) - q).sum())
+        return u if near else inputs
 
     def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
         if not self.safety_filter.held:
@@ -201,7 +201,7 @@ def guarded(advance: Integrator, controller: Controller) -> Integrator:
 
 def method_for(controllers: Sequence[Controller], method: str, tolerance: float = 1e-9) -> Integrator:
     """The integrator of that name; `InputError` for one that does not go with one of the controllers."""
-    found = integrator(method, controllers[0].robot, tolerance)
+    chosen = integrator(method, controllers[0].robot, tolerance)
     if method == "adaptive" and any(each.solver.samples for each in controllers):
         raise InputError(
             "limits, distances, a retreat and a step by Armijo's rule are kept from sample to sample",
@@ -217,7 +217,7 @@ def method_for(controllers: Sequence[Controller], method: str, tolerance: float 
                 expected="zoh",
                 got=method,
             )
-    return found
+    return chosen
 
 
 @dataclass(eq=False)
@@ -266,7 +266,7 @@ class Plant:
         """The ideal robot under a controller: inputs are held near obstacles, and accelerate at order 2."""
         solver = controller.solver
         if solver.second:
-            robot, u_dot = controller.robot, solver.found.second.u_dot
+            robot, u_dot = controller.robot, solver.step_memory.second.u_dot
             return Accelerated(self.integrator, robot, solver.before, u_dot)
         return guarded(self.integrator, controller)
 

@@ -76,8 +76,8 @@ class Retreat:
     ) -> None:
         self.stalled = positive(stalled, "retreat: stalled")
         self.progress = scalar(progress, "retreat: progress", above=0.0, below=1.0)
-        given = np.ravel(np.asarray(DURATIONS if durations is None else durations)).tolist()
-        self.durations = tuple(positive(duration, "retreat: durations") for duration in given)
+        values = np.ravel(np.asarray(DURATIONS if durations is None else durations)).tolist()
+        self.durations = tuple(positive(duration, "retreat: durations") for duration in values)
         if not self.durations:
             raise InputError(where="retreat: durations", expected="at least one", got=None)
         self.posture = posture
@@ -115,15 +115,15 @@ class RetreatNumbers(NamedTuple):
 
 
 def retreat_numbers(retreat: Retreat | None, robot: Robot, rows: Sequence[Row]) -> RetreatNumbers:
-    given = retreat or Retreat()
+    settings = retreat or Retreat()
     return RetreatNumbers(
         units=unit_codes(rows),
-        stalled=np.array(given.stalled),
-        progress=np.array(given.progress),
-        durations=np.array(given.durations if retreat else ()),
+        stalled=np.array(settings.stalled),
+        progress=np.array(settings.progress),
+        durations=np.array(settings.durations if retreat else ()),
         reach=np.array(robot.reach if retreat else 0.0),
-        metres=np.array(given.goal.m),
-        radians=np.array(given.goal.rad),
+        metres=np.array(settings.goal.m),
+        radians=np.array(settings.goal.rad),
         retreats=np.array(0),
         now=np.array(0),
         left=np.array(0.0),
@@ -143,8 +143,8 @@ def stalls(r: RetreatNumbers, error: Array, dt: float, speeds_up: bool) -> bool:
     r.left[()] = 0.0
     metres, radians = norms(error, r.units)
     size = metres / r.reach[()] + RADIAN * radians
-    there = metres <= r.metres[()] and radians <= r.radians[()]
-    if size < (1.0 - r.progress[()]) * r.best[()] or there:
+    at_goal = metres <= r.metres[()] and radians <= r.radians[()]
+    if size < (1.0 - r.progress[()]) * r.best[()] or at_goal:
         r.now[()], r.best[()], r.waited[()] = 0, size, 0.0
         return False
     if not speeds_up:
@@ -165,8 +165,8 @@ class RetreatState:
         self._retreat, self._robot, self._numbers = retreat, robot, numbers
         middle, ranged = robot.rest, robot.limited.all(axis=1)
         middle[ranged] = robot.q_limits[ranged].mean(axis=1)
-        given = retreat.posture
-        self._home = robot.following.placed(middle) if given is None else robot.q(given)
+        posture = retreat.posture
+        self._home = robot.following.placed(middle) if posture is None else robot.q(posture)
 
     @property
     def count(self) -> int:

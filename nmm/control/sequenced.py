@@ -25,7 +25,7 @@ from nmm.control.resolvers.problem import Problem
 from nmm.control.retreat import Retreat
 from nmm.control.sequencing.sequence import Event, Moment, Schedule, Sequence
 from nmm.control.steering import Steering
-from nmm.control.step.step_layout import SERVO, Given, checked
+from nmm.control.step.step_layout import SERVO, ControllerArguments, checked
 from nmm.control.step.step_solver import StepSolver
 from nmm.model.robots.robot import Robot
 
@@ -84,8 +84,8 @@ class SequencedController(Controller):
         tasks = Stack.of(task)
         if not tasks.tasks:
             raise InputError(where="task", expected="at least one")
-        given = (robot, tasks, resolver, objective, Stack(), limits, dt, retreat, steering)
-        self.given = checked(Given(*given, collisions, kinematics, order, servo))
+        arguments = (robot, tasks, resolver, objective, Stack(), limits, dt, retreat, steering)
+        self.given = checked(ControllerArguments(*arguments, collisions, kinematics, order, servo))
         if resolver.takes_added_task:
             raise InputError(
                 "its added task has as many rows as the tasks leave, which changes where tasks come and go",
@@ -94,9 +94,9 @@ class SequencedController(Controller):
             )
         self.schedule: Schedule = Schedule(tasks, robot)
         self._controllers: dict[tuple[bool, ...], Controller] = {}
-        for one in tasks:  # report errors in a task now, not when it begins
-            one.function.stages(robot), one.reference.stages(robot)
-            one.gain_matrix(robot), one.approach(robot)
+        for part in tasks:  # report errors in a task now, not when it begins
+            part.function.stages(robot), part.reference.stages(robot)
+            part.gain_matrix(robot), part.approach(robot)
         first = self.schedule.sequence.next(self.schedule.moment, 0.0, robot.rest)
         self.current = self._controller(first.active, dt)
 
@@ -121,27 +121,27 @@ class SequencedController(Controller):
         return self.schedule.events
 
     def __reduce__(self) -> tuple[object, ...]:
-        given = self.given._replace(dt=self.dt)
-        return type(self), (*given[:4], *given[5:])  # no added task
+        arguments = self.given._replace(dt=self.dt)
+        return type(self), (*arguments[:4], *arguments[5:])  # no added task
 
     def with_arguments(self, **arguments: Any) -> Self:
         """As for `Controller`."""
-        given: tuple[Any, ...] = self.given._replace(**{"dt": self.dt, **arguments})
-        return type(self)(*given[:4], *given[5:])
+        values: tuple[Any, ...] = self.given._replace(**{"dt": self.dt, **arguments})
+        return type(self)(*values[:4], *values[5:])
 
     def _controller(self, active: tuple[bool, ...], dt: float | None) -> Controller:
         """The controller of a set of active tasks."""
         if active not in self._controllers:
-            given, resolver, retreat = self.given, self.given.resolver, self.given.retreat
-            tasks = [task.always for task, on in zip(given.task, active, strict=True) if on]
+            arguments, resolver, retreat = self.given, self.given.resolver, self.given.retreat
+            tasks = [task.always for task, on in zip(arguments.task, active, strict=True) if on]
             if not tasks:
                 tasks, resolver, retreat = [Task(Constant([0.0]), [0.0], gain=None)], descent(resolver), None
-            made = given._replace(task=Stack.of(tasks), resolver=resolver, retreat=retreat, dt=dt)
+            made = arguments._replace(task=Stack.of(tasks), resolver=resolver, retreat=retreat, dt=dt)
             self._controllers[active] = Controller(*made)
-        found = self._controllers[active]
+        controller = self._controllers[active]
         if dt is not None:
-            found.dt = dt
-        return found
+            controller.dt = dt
+        return controller
 
     def switch(self) -> Controller:
         """Change to the controller of the scheduled tasks, and hand over the state."""
@@ -188,8 +188,8 @@ class SequencedController(Controller):
     def reset(self) -> None:
         """Forget all decisions and the previous inputs."""
         self.schedule.reset()
-        for one in self._controllers.values():
-            one.solver.begin_run()
+        for controller in self._controllers.values():
+            controller.solver.begin_run()
 
 
 def descent(resolver: Resolver) -> Resolver:

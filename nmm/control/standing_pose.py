@@ -24,16 +24,18 @@ def standing_pose(solver: StepSolver, q: Array, times: Array) -> Finding | None:
     (R. W. Brockett, Asymptotic stability and feedback stabilization, 1983).
     """
     robot = solver.robot
-    here = Configuration(robot, q)
-    if robot.platform.n_p < 3 or _rank(here.S[:3]) == 3:
+    configuration = Configuration(robot, q)
+    if robot.platform.n_p < 3 or _rank(configuration.S[:3]) == 3:
         return None
     try:
-        targets = [evaluate(task.reference, float(t), here) for task in solver.task for t in times]
-        J = np.vstack([evaluate(task.function, float(times[0]), here).value_q for task in solver.task])
+        targets = [evaluate(task.reference, float(t), configuration) for task in solver.task for t in times]
+        J = np.vstack(
+            [evaluate(task.function, float(times[0]), configuration).value_q for task in solver.task]
+        )
         error = solver.errors(times[:1], q[np.newaxis])[0][0]
     except Exception:  # a user's function may raise anything where it is not defined
         return None
-    if any(np.abs(one.value_t).max() > STANDS or one.value_q.any() for one in targets):
+    if any(np.abs(target.value_t).max() > STANDS or target.value_q.any() for target in targets):
         return None
     if not np.isfinite(J).all():
         return None

@@ -113,7 +113,7 @@ class Steering:
         """The law on a robot with tasks, whichever inputs they use; None where nothing steers a body."""
         if type(robot.platform).steered_axle is Platform.steered_axle:  # spares searching all frames
             return None
-        hands = [one.function.shown().positions for one in task]
+        hands = [part.function.shown().positions for part in task]
         for hand in [*hands, first_tip(robot)]:
             body = None if hand is None else _body(robot, hand)
             axle = None if body is None else robot.platform.steered_axle(body)
@@ -167,18 +167,18 @@ class Steered:
     def described(self) -> tuple[str, ...]:
         """The law in words, then what geometry rules out, if anything."""
         law, names = self.steering, ", ".join(self.inputs)
-        said = (
+        lines = (
             f"{names}: no task feels {'it' if len(self.inputs) == 1 else 'them'}; pursuit of "
             f"{self.pursuit.hand} steers, gain {law.gain:g} 1/s, spring {law.spring:g} 1/s",
         )
         arm, radius = reach(self.robot, self.pursuit.hand), self.least_radius
         if arm is None or not np.isfinite(arm.length):  # unlimited reach
-            return said
+            return lines
         ratio = f"least turning radius {radius:.3g} m, {radius / arm.length:.2g} times the arm's reach"
         if radius <= arm.length:
-            return (*said, ratio)
+            return (*lines, ratio)
         return (
-            *said,
+            *lines,
             f"{ratio} ({arm.length:.3g} m): it cannot turn under its own arm, so that paths which turn "
             "sharply, or begin beside it, may stretch the arm",
         )

@@ -32,7 +32,7 @@ from nmm.control.resolvers.partitions import COLUMNS, FREE, HELD, MODE, OVERDUE,
 from nmm.control.step.equations import ControlStep, call_step, watch_error
 from nmm.control.step.recorded import Recorded, note_held, note_sample
 from nmm.control.step.step_size import Descent, call_shorten, shorten
-from nmm.control.step.stepping import Tableau, end_stages, go_on, tableau
+from nmm.control.step.stepping import Tableau, end_stages, integrate_step, tableau
 
 #: Coordinates or inputs whose norm is beyond this have diverged, m, rad, m/s or rad/s.
 DIVERGED_BEYOND = 1e6
@@ -159,7 +159,7 @@ def advance_samples(
             act(k - 1, dt, q, integers, floats, disturbed, ahead)
             status = float(SOLVED)
         else:
-            status = go_on(times[k - 1], dt, q, integers, floats, method, ahead)
+            status = integrate_step(times[k - 1], dt, q, integers, floats, method, ahead)
         fine = status < SINGULAR_J and within_bound(ahead)
         if partitioned == 1:
             fine = fine and e.state[MODE] != OVERDUE and not passed_zero(e, decided)

@@ -39,7 +39,7 @@ from nmm.control.resolvers import (
 )
 from nmm.control.resolvers.answer import SINGULAR_J, SOLVED, AnswerArrays, unanswered
 from nmm.control.resolvers.base import ANSWER, resolve_one
-from nmm.control.resolvers.saturation import limit
+from nmm.control.resolvers.saturation import enforce_limits
 from nmm.control.step.equations import step
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading import load
@@ -224,7 +224,7 @@ def test_limit_kernel(rng: np.random.Generator) -> None:
             answers = unanswered(4, 1), unanswered(4, 1)
             for answer in answers:
                 answer.u[:], answer.status[()] = u, status
-            both_forms(limit, *((problem.arrays, T, answer) for answer in answers))
+            both_forms(enforce_limits, *((problem.arrays, T, answer) for answer in answers))
             both = [np.concatenate([*map(np.atleast_1d, answer)]) for answer in answers]
             assert_same(*both)
             moved += not np.array_equal(both[0][:4], u)
@@ -237,7 +237,7 @@ def test_no_kernel_is_left_out(robots: dict[str, Robot]) -> None:
     for entry in SINGLE:
         run |= {stage.kernel for stage in entry.function.stages(robots[entry.robots[0]])}
     run |= {entry.function.comparison for entry in COMPARED}
-    run |= {limit, step}  # `step` in whole programs, below
+    run |= {enforce_limits, step}  # `step` in whole programs, below
     assert not {name for name, kernel in kernels().items() if kernel not in run}
 
 

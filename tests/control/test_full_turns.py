@@ -186,7 +186,7 @@ def test_a_retreat_goes_home_the_short_way(robot: Robot) -> None:
     assert state is not None
     q = robot.q({"j1": 3.0})
     controller(0.0, q)
-    u = state.inputs(q, controller.solver.program.buffers.G, controller.solver.found.problem)
+    u = state.inputs(q, controller.solver.program.buffers.G, controller.solver.step_memory.problem)
     assert u[robot.input("j1")] > 0.0
 
 

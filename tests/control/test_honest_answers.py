@@ -95,7 +95,7 @@ def inverted(controller: nmm.Controller, step: nmm.extending.Step) -> tuple[Arra
         return J, rate
     rows = controller.given.added_task.rows(controller.robot)
     own = row_scales(rows, controller.robot)
-    problem = controller.solver.found.problem
+    problem = controller.solver.step_memory.problem
     return (
         np.vstack([J, problem.added_J / own[:, None]]),
         np.concatenate([rate, problem.added_rate / own]),

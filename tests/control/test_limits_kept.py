@@ -54,7 +54,7 @@ def test_stages_keep_the_samples_bounds(method: str) -> None:
     controller = towards((3.0, 2.0), nmm.Limits({"platform": 0.5, "arm": 0.8}, acceleration=2.0))
     advance = integrator(method, ROBOT, 1e-9)
     q = START.copy()
-    problem = controller.solver.found.problem
+    problem = controller.solver.step_memory.problem
     for k in range(100):
         u = controller(k * DT, q)
         bounds = np.column_stack([problem.u_lower, problem.u_upper])
@@ -136,9 +136,10 @@ def metric(kind: str, step: nmm.extending.Step, controller: nmm.Controller) -> A
         return np.vstack([np.linalg.solve(step.J[:, basic], step.J), np.eye(m)[rest]])
     if kind == "ej":
         scales = np.append(
-            controller.solver.found.problem.row_scales, controller.solver.found.problem.added_row_scales
+            controller.solver.step_memory.problem.row_scales,
+            controller.solver.step_memory.problem.added_row_scales,
         )
-        return np.vstack([step.J, controller.solver.found.problem.added_J]) / scales[:, None]
+        return np.vstack([step.J, controller.solver.step_memory.problem.added_J]) / scales[:, None]
     return np.eye(m)
 
 
@@ -159,7 +160,7 @@ def test_each_resolver_finds_its_own_optimum(kind: str) -> None:
     more = {"added_task": added} if kind == "ej" else {}
     free = towards((2.5, 1.5), None, RESOLVERS[kind](), **more)
     kept = towards((2.5, 1.5), limits, RESOLVERS[kind](), **more)
-    problem = kept.solver.found.problem
+    problem = kept.solver.step_memory.problem
     q, bound = START.copy(), 0
     rng = np.random.default_rng(3)
     for k in range(150):
@@ -226,7 +227,7 @@ def test_bounds_of_far_limits_need_no_search(monkeypatch: pytest.MonkeyPatch) ->
             stops = {"q1": [-1.0, 0.5], "q2": [-0.3, 2.0], "q3": [0.0, 0.2]}
             controller = towards((3.0, 2.0), nmm.Limits({"arm": 0.8}, stops, acceleration=2.0))
             solver, rng = controller.solver, np.random.default_rng(seed)
-            limits, problem = solver.found.limits, solver.found.problem
+            limits, problem = solver.step_memory.limits, solver.step_memory.problem
             for _ in range(100):
                 solver.before[:] = rng.uniform(-0.9, 0.9, ROBOT.n_u)
                 q = np.append(np.zeros(3), rng.uniform([-1.1, -0.4, -0.1], [0.6, 2.1, 0.3]))
@@ -378,7 +379,7 @@ def test_no_limit_is_active_where_the_inputs_are_within_all(resolver: nmm.extend
     controller = nmm.Controller(
         robot, nmm.Task(nmm.Position("ee", "xy"), target), resolver, limits=limits, dt=0.01
     )
-    active = controller.solver.found.problem.active
+    active = controller.solver.step_memory.problem.active
     controller(0.0, robot.q({"x": -2.0, "q2": 0.5}))
     assert active[0] > 0
     controller(0.01, there)

@@ -69,7 +69,7 @@ def test_wheels_turn_as_fast_as_their_rows_say(
     robot = nmm.mount(moving, "small_arm", at="arm_mount")
     task = nmm.Task(nmm.LinearCoordinates(robot.q_names[-1]), nmm.Constant([0.3]))
     controller = nmm.Controller(robot, task, PG, limits=nmm.Limits(position=False, wheels=5.0), dt=DT)
-    rows = controller.solver.found.problem.limit_rows
+    rows = controller.solver.step_memory.problem.limit_rows
     names = controller.solver.limits_on.rows
     assert len(rows) == len(names) == count
     drawn = Rolling(robot)

@@ -30,7 +30,7 @@ def least_samples(controller: nmm.Controller, q: Array, u: Array, most: int) -> 
     acceleration, wheels and joints hold at each sample, and after it."""
     robot, kept = controller.robot, controller.solver.limits_on
     m, change, one = robot.n_u, kept.accelerations * DT, np.eye(robot.n_u)
-    wheels = controller.solver.found.problem.limit_rows[: len(kept.spin)].copy()
+    wheels = controller.solver.step_memory.problem.limit_rows[: len(kept.spin)].copy()
     if np.any(kept.wheels[:, 4] >= 0.0):  # rows that turn with the steering: without them, a lower bound
         wheels = wheels[:0]
     moved = robot.rate_coordinates
@@ -173,7 +173,7 @@ def test_a_stop_needs_no_task_and_no_answer() -> None:
     for k in range(30):
         u = controller(k * DT, q)
         q = held(q, u, DT)
-    controller.solver.found.task.gain[:] = np.nan
+    controller.solver.step_memory.task.gain[:] = np.nan
     with pytest.raises(nmm.SingularError):
         controller(0.3, q)
     us, qs = stopped(controller, q)
@@ -192,7 +192,7 @@ def test_beyond_a_limit_a_stop_stays_and_a_call_returns() -> None:
         returned = controller(k * DT, q)
     assert returned[2] == pytest.approx(-0.1)
     assert controller.limits is not None
-    assert controller.solver.found.limits.recovery == controller.limits.recovery
+    assert controller.solver.step_memory.limits.recovery == controller.limits.recovery
 
 
 def test_without_limits_a_stop_is_zero_and_bad_input_is_told() -> None:

@@ -139,7 +139,7 @@ def silent(lasts: float) -> dict[str, Any]:
     loop = make_loop(target)
 
     def each(t: float) -> None:
-        gains = loop.controller.solver.found.task.gain
+        gains = loop.controller.solver.step_memory.task.gain
         gains[:] = np.nan if BEGINS <= t < BEGINS + lasts else 2.0 * np.eye(2)
 
     return {"loop": loop, "each": each}

@@ -60,7 +60,7 @@ def wander(
     signal = task.reference
     advance, solver = integrator(method, robot, 1e-9), controller.solver
     if solver.second:
-        advance = Accelerated(advance, robot, solver.before, solver.found.second.u_dot)
+        advance = Accelerated(advance, robot, solver.before, solver.step_memory.second.u_dot)
     controller.dt = DT
     q, before = q0.copy(), np.zeros(robot.n_u)
     controller.reset()

@@ -141,7 +141,7 @@ made = [one for one in gc.get_objects() if isinstance(one, Compiled)]
 before = [len(one.entries) for one in made]
 for k in range(60):
     controller(0.05 * k, q)
-    q = q + 0.05 * controller.solver.found.q_dot
+    q = q + 0.05 * controller.solver.step_memory.q_dot
 look = controller.safety_filter
 look._lookout.slower(np.ones(robot.n_u), 0.05)
 look._brake(3.0, q, np.zeros(robot.n_u), Short(0, 0.05, 1.0, q, 1.0))

@@ -62,7 +62,7 @@ def test_limits_of_its_wheels_are_those_of_its_sides() -> None:
     limits = nmm.Limits(position=False, wheels=5.0)
     controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=limits, dt=0.01)
     controller(0.0, robot.q())
-    rows = controller.solver.found.problem.limit_rows
+    rows = controller.solver.step_memory.problem.limit_rows
     left = [wheel.center[1] > 0.0 for wheel in robot.wheels]
     expected = np.zeros((4, robot.n_u))
     expected[np.arange(4), np.where(left, 0, 1)] = 1.0

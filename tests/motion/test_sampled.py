@@ -99,7 +99,7 @@ def controlled(kept: bool = True, **more: object) -> nmm.Controller:
 
 def counts(controller: nmm.Controller) -> tuple[int, int, int]:
     """Calls: among the numbers, in the state, among the options."""
-    step = controller.solver.found
+    step = controller.solver.step_memory
     return int(step.numbers[0]), int(controller.solver.state.memory[0]), int(step.options[0])
 
 

@@ -81,7 +81,7 @@ PINOCCHIO, COMPILED = "pinocchio", "compiled"
 BESIDE = header_length(LaidOut)
 
 
-def nothing(t: float, q: Array) -> None:
+def no_preparation(t: float, q: Array) -> None:
     """Prepares a program that needs nothing: compiled kinematics, no users' functions."""
 
 
@@ -99,8 +99,8 @@ def run_stages(t: float, q: Array, integers: Integers, floats: Array, b: Buffers
     program = views(LaidOut, integers, floats, 0)
     n = q.shape[0]
     if program.kinematics[()] > 0:
-        here = views(Kinematics, integers, floats, int(program.kinematics[()]))
-        place_frames(here.joints, here.frames, q, b.placements, b.jacobians, b.hessians)
+        kinematics = views(Kinematics, integers, floats, int(program.kinematics[()]))
+        place_frames(kinematics.joints, kinematics.frames, q, b.placements, b.jacobians, b.hessians)
     clear(b.G)
     clear(b.G_q)
     clear(b.value)
@@ -131,8 +131,8 @@ PLACE = void(BLOCKS, int64, float64[::1], _TABLES, _TABLES, _TENSORS)
 
 @compiled
 def place(blocks: Blocks, table: int, q: Array, placements: Array, jacobians: Array, hessians: Array) -> None:
-    here = views(Kinematics, blocks.integers, blocks.floats, table)
-    place_frames(here.joints, here.frames, q, placements, jacobians, hessians)
+    kinematics = views(Kinematics, blocks.integers, blocks.floats, table)
+    place_frames(kinematics.joints, kinematics.frames, q, placements, jacobians, hessians)
 
 
 class Program:
@@ -152,7 +152,7 @@ class Program:
     calls_python : whether users' Python functions are among them
     costs : what makes such functions slow, a sentence each
     renewals : numbers that a run replaces
-    prepare : (t, q) -> None, Pinocchio's part at q and the users' Python functions, or `nothing`
+    prepare : (t, q) -> None, Pinocchio's part at q and the users' Python functions, or `no_preparation`
     """
 
     blocks: Blocks
@@ -181,7 +181,7 @@ class Program:
             self._stages += [(stage, self._rows) for stage in stages]
             self._rows += max((stage.rows for stage in stages), default=0)
         live = [stage.live for stage, _ in self._stages]
-        self.renewals = tuple(one for one in live if isinstance(one, Renewal))
+        self.renewals = tuple(numbers for numbers in live if isinstance(numbers, Renewal))
         self.remembers = any(stage.remembers for stage, _ in self._stages)
         own = [frame for stage, _ in self._stages for frame in stage.frames]
         self._frames = tuple(dict.fromkeys([*own, *frames]))
@@ -228,8 +228,8 @@ class Program:
         for stage, row in self._stages:
             slots = self.slots(stage.frames)
             bounds = row - stage.before, row + stage.rows
-            fixed, kept = (NONE, stage.numbers) if stage.remembers else (stage.numbers, NONE)
-            memory.add(LaidOutStage(stage.kernel.address, *bounds, slots, fixed, kept))
+            fixed, remembered = (NONE, stage.numbers) if stage.remembers else (stage.numbers, NONE)
+            memory.add(LaidOutStage(stage.kernel.address, *bounds, slots, fixed, remembered))
         ids = [None if name == CENTER_OF_MASS else robot.frame_id(name) for name in self._frames]
         memory.add(Kinematics(robot.joints, frame_table(robot.model, robot.joint_axes, ids)))
         for record in after:
@@ -237,8 +237,8 @@ class Program:
         self.blocks = memory.blocks()
         laid = views(LaidOut, *self.blocks, 0)
         self._kinematics, self._table, self.stands = laid.kinematics, table, laid.stands
-        self.buffers = found = laid.buffers
-        update = nothing if self._compiled else kinematics_updater(robot, self._frames, *found[:3])
+        self.buffers = arrays = laid.buffers
+        update = no_preparation if self._compiled else kinematics_updater(robot, self._frames, *arrays[:3])
         self._numbers = [views(LaidOutStage, *self.blocks, int(place)).numbers for place in places]
         callbacks = []
         for (stage, _), block in zip(self._stages, self._numbers, strict=True):
@@ -247,8 +247,8 @@ class Program:
             if stage.callback is not None:
                 callbacks.append((stage.callback, block))
         self.calls_python = bool(callbacks)
-        said = (getattr(callback, "costs", "") for callback, _ in callbacks)
-        self.costs = tuple(dict.fromkeys(sentence for sentence in said if sentence))
+        costs = (getattr(callback, "costs", "") for callback, _ in callbacks)
+        self.costs = tuple(dict.fromkeys(sentence for sentence in costs if sentence))
         self.prepare = _with_callbacks(robot, update, callbacks) if callbacks else update
 
     @contextmanager
@@ -264,7 +264,7 @@ class Program:
     def kinematics_off(self, configurations: Array) -> float:
         """The most by which Pinocchio's kinematics and the compiled ones differ at q (N, n), m and rad."""
         robot, b = self.robot, self.buffers
-        theirs, ours = ([np.zeros_like(one) for one in b[:3]] for _ in range(2))
+        theirs, ours = ([np.zeros_like(array) for array in b[:3]] for _ in range(2))
         update = kinematics_updater(robot, self._frames, *theirs)
         off = 0.0
         for q in configurations:

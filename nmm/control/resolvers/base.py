@@ -56,8 +56,8 @@ def weight_matrix(weights: Weights, dimensions: Dimensions) -> Array:
     if isinstance(weights, Mapping):
         W = np.diag(by_name(weights, dimensions.inputs, dimensions.groups))
     else:
-        given = array(weights, "weights")
-        W = np.diag(given) if given.ndim == 1 else given
+        values = array(weights, "weights")
+        W = np.diag(values) if values.ndim == 1 else values
     m = dimensions.m
     expect(W.shape == (m, m), "weights", f"{m} numbers or a {m} x {m} matrix", W)
     if not np.array_equal(W, W.T) or np.linalg.eigvalsh(W).min() <= 0.0:

@@ -67,24 +67,24 @@ class CallableResolver(Resolver):
         answer.measure[()] = np.nan
         answer.nu[:] = 1.0
         answer.excess[()] = np.nan
-        if not all(np.isfinite(given).all() for given in (problem.J, problem.rate, problem.h)):
+        if not all(np.isfinite(array).all() for array in (problem.J, problem.rate, problem.h)):
             answer.status[()] = Status.NOT_FINITE
             return
         try:
-            found = self.function(Problem.of(problem, dimensions))
+            result = self.function(Problem.of(problem, dimensions))
         except np.linalg.LinAlgError:
             answer.status[()] = Status.SINGULAR_J
             return
-        u = np.asarray(found.u if isinstance(found, Answer) else found, dtype=np.float64)
+        u = np.asarray(result.u if isinstance(result, Answer) else result, dtype=np.float64)
         if u.shape != answer.u.shape:
             raise InputError(where="callable resolver", expected=f"u of shape {answer.u.shape}", got=u)
         answer.u[:] = u
         residual, rounding = residual_norm(problem.J, answer.u, problem.rate)
         answer.residual[()] = residual
         answer.status[()] = certified(residual, rounding, math.hypot(*problem.rate))
-        if isinstance(found, Answer):
-            answer.measure[()] = found.measure
-            if found.status is not Status.SOLVED and answer.status[()] < Status.SINGULAR_J:
-                answer.status[()] = found.status
-                answer.nu[:] = found.nu
+        if isinstance(result, Answer):
+            answer.measure[()] = result.measure
+            if result.status is not Status.SOLVED and answer.status[()] < Status.SINGULAR_J:
+                answer.status[()] = result.status
+                answer.nu[:] = result.nu
         bring_within(problem, NO_METRIC, answer)

@@ -41,8 +41,8 @@ def damp(
     J, u0, solution = scratch((s, m)), scratch(m), scratch(m)
     weigh(problem, alpha, W, J, u0)
     scales, damped = problem.row_scales, scratch(m)
-    found = damped_solution(J, scales, problem.rate, problem.ends, u0, law, dt, solution, answer.nu, damped)
-    give(problem, W, solution, found, answer)
+    damping = damped_solution(J, scales, problem.rate, problem.ends, u0, law, dt, solution, answer.nu, damped)
+    give(problem, W, solution, damping, answer)
     unweigh(W, damped, solution)
     return overrun(problem, solution)
 
@@ -64,11 +64,11 @@ def overrun(problem: ProblemArrays, asked: Array) -> tuple[float, float]:
 
 @compiled
 def give(
-    problem: ProblemArrays, W: Array, solution: Array, found: tuple[float, bool], answer: AnswerArrays
+    problem: ProblemArrays, W: Array, solution: Array, damping: tuple[float, bool], answer: AnswerArrays
 ) -> None:
-    """Write the answer with u = C solution; found and answer.nu come from `damped_solution`."""
+    """Write the answer with u = C solution; damping and answer.nu come from `damped_solution`."""
     unweigh(W, solution, answer.u)
-    answer.measure[()], damped = found
+    answer.measure[()], damped = damping
     certify(problem, answer)
     if answer.status[()] == INEXACT and damped:
         answer.status[()] = RELAXED
@@ -140,10 +140,10 @@ def damp_between_stops(
         held[i], left[i] = 0, 0
     basis = Basis(scratch((m, m)), scratch((m, m)), integer_scratch(m), scratch(m), scratch(m))
     falls, multipliers, n = scratch(m), scratch(m), scratch(m)
-    k, found = 0, (0.0, False)
+    k, damping = 0, (0.0, False)
     cost = law.damping * law.damping if law.mode == CONSTANT else 0.0
     for _ in range(ROUNDS * stops):
-        found = between(problem, J, u0, G, held, basis, k, law, dt, solution, answer.nu)
+        damping = between(problem, J, u0, G, held, basis, k, law, dt, solution, answer.nu)
         asked = fall(problem, J, solution, u0, cost, falls)
         split(basis, k, falls)
         combination(basis, k, basis.d, multipliers)
@@ -169,7 +169,7 @@ def damp_between_stops(
             continue
         held[back], held[new] = 0, side
         k = hold(G, held, basis, n)
-    give(problem, W, solution, found, answer)
+    give(problem, W, solution, damping, answer)
 
 
 @compiled
@@ -225,9 +225,9 @@ def between(
         copied(J[i], A[i])
         project_out(A[i], basis.Q, used)
     scales = problem.row_scales
-    found = damped_solution(A, scales, b, problem.ends, free, law, dt, solution, shares, nothing)
+    damping = damped_solution(A, scales, b, problem.ends, free, law, dt, solution, shares, nothing)
     add(solution, 1.0, start)
-    return found
+    return damping
 
 
 @compiled
@@ -249,11 +249,11 @@ def farthest_passed(problem: ProblemArrays, G: Array, solution: Array, held: Int
 def in_the_way(basis: Basis, k: int, shares: Array, multipliers: Array) -> int:
     """The held stop to release so that another one can be held; -1 for none. With the other's row Σ r_i n_i,
     r the shares, it is the stop with r_i > 0 whose multiplier (`keeps_back`) reaches 0 first."""
-    found, least = -1, math.inf
+    blocking, least = -1, math.inf
     for i in range(k):
         if shares[i] > DEPENDENT and multipliers[i] / shares[i] < least:
-            found, least = basis.members[i], multipliers[i] / shares[i]
-    return int(found)
+            blocking, least = basis.members[i], multipliers[i] / shares[i]
+    return int(blocking)
 
 
 @compiled
@@ -279,8 +279,8 @@ def keeps_back(basis: Basis, k: int, multipliers: Array, left: Integers, least: 
     along the outward rows n_i of the stops: a multiplier ν_i < 0 means that it falls on returning from stop
     i.
     """
-    found, most = -1, least
+    member, most = -1, least
     for i in range(k):
         if -multipliers[i] > most and left[basis.members[i]] < MOST_LEFT:
-            found, most = basis.members[i], -multipliers[i]
-    return int(found)
+            member, most = basis.members[i], -multipliers[i]
+    return int(member)

@@ -1,4 +1,4 @@
-"""The check of inputs against limits, and the call, by its address, of `limit`, which enforces them."""
+"""Check inputs against limits, and call `enforce_limits` by its address."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from nmm.control.resolvers.problem_arrays import ProblemArrays
 #: Tolerance of rows of limits that the resolver itself has enforced.
 LEFT = 1e-9
 
-#: Signature of `limit`: the problem, the inverse of the resolver's metric, and the answer that it changes.
+#: Signature of `enforce_limits`: the problem, the inverse of the resolver's metric, the answer it changes.
 LIMIT = void(record_type(ProblemArrays), float64[:, ::1], record_type(AnswerArrays))
 
 call_limit = caller(LIMIT)
@@ -76,8 +76,8 @@ def undefined(problem: ProblemArrays) -> bool:
 
 @compiled
 def keep_limits(problem: ProblemArrays, answer: AnswerArrays) -> None:
-    """Call `limit` where the resolver found no inputs, or inputs beyond the limits; where nothing did so, no
-    limit is active. A limit that has no value ends a run: nothing says that it is kept."""
+    """Call `enforce_limits` where the resolver found no inputs, or inputs beyond the limits; where
+    nothing did so, no limit is active. A limit that has no value ends a run: nothing says that it is kept."""
     for i in range(problem.lower.shape[0]):
         if math.isnan(problem.lower[i]) or math.isnan(problem.upper[i]):
             answer.status[()] = NOT_FINITE

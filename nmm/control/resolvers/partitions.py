@@ -87,8 +87,8 @@ def candidate_columns(partitions: Sequence[Partition], dimensions: Dimensions) -
     count = math.comb(dimensions.m, dimensions.s)
     if not partitions and count > MOST_CANDIDATES:
         raise InputError(f"too many to try ({count}); give a list of some", where="partitions")
-    given = (_columns(partition, dimensions) for partition in partitions)
-    every = given if partitions else itertools.combinations(range(dimensions.m), dimensions.s)
+    chosen = (_columns(partition, dimensions) for partition in partitions)
+    every = chosen if partitions else itertools.combinations(range(dimensions.m), dimensions.s)
     return np.fromiter(itertools.chain.from_iterable(every), dtype=np.int64)
 
 

@@ -13,7 +13,7 @@ from nmm.base.arrays import Array, Integers, array, scalar, vector
 from nmm.base.errors import InputError, expect
 from nmm.base.text_format import apart
 from nmm.control.resolvers.problem_arrays import ProblemArrays
-from nmm.control.resolvers.saturation import limit
+from nmm.control.resolvers.saturation import enforce_limits
 
 #: Fields of `ProblemArrays` besides the problem's own numbers.
 MEMORY = ("ends", "stops", "active", "limiter")
@@ -114,7 +114,7 @@ class Problem:
         added_J = np.zeros((0, m)) if self.added_J is None else _rows(self.added_J, m, "added_J")
         limit_rows = np.zeros((0, m)) if self.limit_rows is None else _rows(self.limit_rows, m, "limit_rows")
         k, count = len(added_J), len(limit_rows)
-        given = {
+        fields = {
             "J": J,
             "rate": vector(self.rate, s, "rate"),
             "h": vector(self.h, m, "h"),
@@ -134,7 +134,7 @@ class Problem:
             "rising": _rates(self.rising, m, "rising"),
             "dt": float("nan") if np.isnan(self.dt) else scalar(self.dt, "dt"),
         }
-        vars(self).update(given)
+        vars(self).update(fields)
 
     @classmethod
     def of(cls, arrays: ProblemArrays, dimensions: Dimensions) -> Problem:
@@ -162,7 +162,7 @@ class Problem:
         stops = np.zeros(count, dtype=np.int64)
         active = np.zeros((len(ends) + 1) * (2 + count), dtype=np.int64)
         limited = len(own["lower"]) > 0 or np.isfinite([own["u_lower"], own["u_upper"]]).any()
-        limiter = limit.address if limited else 0
+        limiter = enforce_limits.address if limited else 0
         return ProblemArrays(ends=ends, stops=stops, active=active, limiter=limiter, **own)
 
 
@@ -185,21 +185,21 @@ def _rates(value: ArrayLike | None, count: int, name: str) -> Array:
 
 
 def _limit_levels(value: ArrayLike | None, count: int, levels: int) -> Integers:
-    given = np.zeros(count) if value is None else vector(value, count, "limit_levels")
-    if np.any((given < 0) | (given > levels + 1) | (given != np.floor(given))):
-        raise InputError(where="limit_levels", expected=f"whole numbers from 0 to {levels + 1}", got=given)
-    return given.astype(np.int64)
+    numbers = np.zeros(count) if value is None else vector(value, count, "limit_levels")
+    if np.any((numbers < 0) | (numbers > levels + 1) | (numbers != np.floor(numbers))):
+        raise InputError(where="limit_levels", expected=f"whole numbers from 0 to {levels + 1}", got=numbers)
+    return numbers.astype(np.int64)
 
 
 def _bounds(lower: ArrayLike | None, upper: ArrayLike | None, count: int, *names: str) -> dict[str, Array]:
-    found = {}
+    by_name = {}
     for name, value, none in zip(names, (lower, upper), (-np.inf, np.inf), strict=True):
         bounds = np.full(count, none) if value is None else np.array(value, dtype=np.float64)
         valid = bounds.shape == (count,) and not np.any(np.isnan(bounds))
         expect(valid, name, f"{count} numbers (infinite for none)", bounds)
-        found[name] = bounds
-    low, high = found.values()
+        by_name[name] = bounds
+    low, high = by_name.values()
     for i in np.flatnonzero(low > high):
         above, below = apart(float(low[i]), float(high[i]), digits=6)
         raise InputError(f"{above} of number {i} is above its {names[1]}, {below}", where=names[0])
-    return found
+    return by_name

@@ -38,7 +38,7 @@ class ProblemArrays(NamedTuple):
     before (m,) : the previous inputs
     falling, rising (m,) : how fast inputs may fall and rise, per second; infinite for none
     dt () : how long u will be applied, s; NaN where unknown
-    limiter : address of `limit`; 0 without limits
+    limiter : address of `enforce_limits`; 0 without limits
 
     Examples
     --------

@@ -3,7 +3,7 @@ possible.
 
 For one level of priority: the largest λ in [0, 1] with J u = r0 + λ (J u* - r0) and u within the limits, then
 the least ‖B (u - u*)‖. u* is the resolver's own answer, returned unchanged if within the limits, B its
-metric, r0 = J u_ref, with u_ref the inputs within the limits nearest to rest, or those of the levels above: λ
+metric, r0 = J u_ref, with u_ref the inputs nearest to rest, or those of the levels above: λ
 = 0 is always possible. α h is part of u*, never scaled, only projected. Soft limits are rows placed among the
 levels: they are kept as far as the levels above allow, widened by the least number that makes this possible,
 and hold, so widened, for the levels below.
@@ -65,8 +65,8 @@ def nearest_allowed(problem: ProblemArrays, wanted: Array, u: Array) -> float:
 
 
 @compiled
-def instead(problem: ProblemArrays, wanted: Array, answer: AnswerArrays) -> None:
-    """Answer with the inputs nearest to `wanted`; the task's share is 0, on purpose."""
+def replace_by_nearest(problem: ProblemArrays, wanted: Array, answer: AnswerArrays) -> None:
+    """Answer with the inputs within the limits nearest to `wanted`; the task's share is 0, on purpose."""
     answer.excess[()] = nearest_allowed(problem, wanted, answer.u)
     answer.residual[()], _ = residual_norm(problem.J, answer.u, problem.rate)
     answer.status[()] = RELAXED
@@ -78,14 +78,16 @@ def fall_back(problem: ProblemArrays, answer: AnswerArrays) -> None:
     """Answer with the inputs nearest to rest; the status is FALLBACK."""
     rest = scratch(answer.u.shape[0])
     clear(rest)
-    instead(problem, rest, answer)
+    replace_by_nearest(problem, rest, answer)
     answer.status[()] = FALLBACK
 
 
 @kernel(LIMIT)
-def limit(problem: ProblemArrays, T: Array, answer: AnswerArrays) -> None:
-    """Bring the resolver's inputs, or, where there are none, those nearest to rest, within the limits; T (m,
-    m) is the inverse of the metric B, (0, 0) for the identity."""
+def enforce_limits(problem: ProblemArrays, T: Array, answer: AnswerArrays) -> None:
+    """Bring the resolver's inputs within the limits, or, where it has none, those nearest to rest.
+
+    T (m, m) is the inverse of the metric B; (0, 0) for the identity.
+    """
     if answer.status[()] >= SINGULAR_J:
         fall_back(problem, answer)
         return
@@ -147,13 +149,13 @@ def limit(problem: ProblemArrays, T: Array, answer: AnswerArrays) -> None:
 
 
 @compiled
-def shortest(problem: ProblemArrays, end: int, given: Array, u: Array) -> None:
-    """The shortest u (m,) that gives the first `end` rows of J the same rates as `given`."""
+def shortest(problem: ProblemArrays, end: int, other: Array, u: Array) -> None:
+    """The shortest u (m,) that gives the first `end` rows of J the same rates as `other`."""
     m = u.shape[0]
     nothing, rates, none, target = scratch(end), scratch(end), scratch(0), scratch(m)
     clear(nothing)
     clear(target)
-    times(problem.J, given, rates)
+    times(problem.J, other, rates)
     active = integer_scratch(2)
     active[0] = 0
     rows = Rows(view(problem.J, 0, (end, m)), nothing, rates, scratch((0, m)), none, none, none)

@@ -110,9 +110,9 @@ def differentiate(integers: Integers, floats: Array) -> None:
         behind, ahead = own.y[BEHIND, i], own.y[AHEAD, i]
         own.D[i] = (ahead - behind) / (2.0 * own.h[()])
         if i < with_middle:
-            here = own.y[HERE, i]
-            if abs(ahead - 2.0 * here + behind) > JUMPED * (1.0 + abs(here)):
-                gone = here - behind if abs(here - behind) < abs(ahead - here) else ahead - here
+            middle = own.y[HERE, i]
+            if abs(ahead - 2.0 * middle + behind) > JUMPED * (1.0 + abs(middle)):
+                gone = middle - behind if abs(middle - behind) < abs(ahead - middle) else ahead - middle
                 own.D[i] = gone / own.h[()]
 
 

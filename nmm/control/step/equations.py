@@ -28,7 +28,7 @@ from nmm.control.resolvers.answer import NOT_FINITE, RELAXED, SINGULAR_J, SOLVED
 from nmm.control.resolvers.base import call_resolver
 from nmm.control.resolvers.limit_check import keep_limits
 from nmm.control.resolvers.problem_arrays import ProblemArrays
-from nmm.control.resolvers.saturation import instead
+from nmm.control.resolvers.saturation import replace_by_nearest
 from nmm.control.retreat import RetreatNumbers, stalls
 from nmm.control.steering import SteeringNumbers, steer
 from nmm.control.step.step_records import SecondOrder, TaskRows
@@ -294,7 +294,7 @@ def drive_inputs(integers: Integers, floats: Array) -> None:
 def replace_inputs(wanted: Array, integers: Integers, floats: Array) -> None:
     """Answer with the inputs nearest to `wanted` (m,) within the limits, in place of the resolver's."""
     e = views(ControlStep, integers, floats, BESIDE)
-    instead(e.problem, wanted, e.answer)
+    replace_by_nearest(e.problem, wanted, e.answer)
     write_shares(e.task, e.problem, e.answer, e.scale)
     drive_inputs(integers, floats)
 

@@ -53,8 +53,8 @@ def _derivatives(solver: StepSolver, q: Array) -> Sequence[Array]:
     whole = []
     for _, term in () if objective is None else objective.terms():
         if isinstance(term, Product):
-            here = Configuration(robot, q)
-            whole.append(evaluate(term.function, 0.0, here).value_q @ here.S)
+            configuration = Configuration(robot, q)
+            whole.append(evaluate(term.function, 0.0, configuration).value_q @ configuration.S)
     return J, added_J[: len(solver.added_task.rows(robot))], h, *whole
 
 
@@ -65,13 +65,13 @@ def _zero_columns(
     largest = np.zeros(solver.robot.n_u)
     looked = False
     try:
-        with solver.sample.aside():
+        with solver.sample.preserve_state():
             for q in _configurations(solver, solver.robot.q(q0)):
                 solver.linearise(0.0, q)
-                here = matrices(solver, q)
-                if not all(np.isfinite(matrix).all() for matrix in here):
+                evaluated = matrices(solver, q)
+                if not all(np.isfinite(matrix).all() for matrix in evaluated):
                     continue
-                for matrix in here:
+                for matrix in evaluated:
                     size = float(np.linalg.norm(matrix))
                     if size > 0.0:
                         largest = np.maximum(largest, np.linalg.norm(matrix, axis=0) / size)

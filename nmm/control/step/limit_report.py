@@ -45,11 +45,11 @@ class LimitReport:
         problem = self._step.problem
         rates = problem.limit_rows @ self._step.answer.u
         excess = self._step.second.share * np.maximum(rates - problem.upper, problem.lower - rates)
-        found: dict[str, float] = {}
+        by_name: dict[str, float] = {}
         for name, by in zip(self._row_names, excess, strict=True):
             if by > 1e-9:
-                found[name] = max(float(by), found.get(name, 0.0))
-        return found
+                by_name[name] = max(float(by), by_name.get(name, 0.0))
+        return by_name
 
     def contradiction(self) -> tuple[str, ...]:
         """The limits that contradict each other in the last call; () where some inputs satisfy all."""
@@ -86,17 +86,17 @@ def contradicting(problem: ProblemArrays, inputs: Sequence[str], rows: Sequence[
     m, count = len(inputs), len(rows)
     if not count:
         return ()
-    one = np.ones((count, 1))
-    A = np.vstack([np.hstack([problem.limit_rows, -one]), np.hstack([-problem.limit_rows, -one])])
+    ones = np.ones((count, 1))
+    A = np.vstack([np.hstack([problem.limit_rows, -ones]), np.hstack([-problem.limit_rows, -ones])])
     b = np.concatenate([problem.upper, -problem.lower])
     some = np.isfinite(b)
     bounds = [*zip(problem.u_lower, problem.u_upper, strict=True), (0.0, None)]
-    found = linprog(np.append(np.zeros(m), 1.0), A[some], b[some], bounds=bounds)
-    if found.x is None or found.x[-1] <= 0.0:
+    solution = linprog(np.append(np.zeros(m), 1.0), A[some], b[some], bounds=bounds)
+    if solution.x is None or solution.x[-1] <= 0.0:
         return ()
     prices = np.zeros(2 * count)
-    prices[some] = np.abs(found.ineqlin.marginals)
+    prices[some] = np.abs(solution.ineqlin.marginals)
     of_rows = prices.reshape(2, count).max(axis=0)
-    of_inputs = np.abs(found.lower.marginals[:m]) + np.abs(found.upper.marginals[:m])
+    of_inputs = np.abs(solution.lower.marginals[:m]) + np.abs(solution.upper.marginals[:m])
     priced = zip([*rows, *inputs], [*of_rows, *of_inputs], strict=True)
     return tuple(dict.fromkeys(name for name, price in priced if price > 1e-9))

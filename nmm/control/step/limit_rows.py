@@ -145,6 +145,6 @@ def note_held_values(q: Array, u: Array, integers: Integers, floats: Array, out:
     clear(b.G_q)
     call_platform(program.platform_kernel, view(q, 0, (b.G.shape[0],)), program.platform_numbers, b.G, b.G_q)
     # The kinematics' record is the one before the first limit's.
-    here = views(Kinematics, integers, floats, int(e.own_limits[0]) - KINEMATICS)
-    place_frames(here.joints, here.frames, q, b.placements, b.jacobians, b.hessians)
+    kinematics = views(Kinematics, integers, floats, int(e.own_limits[0]) - KINEMATICS)
+    place_frames(kinematics.joints, kinematics.frames, q, b.placements, b.jacobians, b.hessians)
     note_values(q, u, unknown, integers, floats, out)

@@ -172,9 +172,9 @@ def drift(record: Record) -> Array:
 
 def partition_changes(record: Record) -> Integers:
     """1 at the samples from which RG has another partition, else 0 (N,)."""
-    found = np.zeros(len(record["partition"]), dtype=np.int64)
-    found[1:] = np.any(np.diff(record["partition"], axis=0) != 0, axis=1)
-    return found
+    changes = np.zeros(len(record["partition"]), dtype=np.int64)
+    changes[1:] = np.any(np.diff(record["partition"], axis=0) != 0, axis=1)
+    return changes
 
 
 def _late(t: Array, x: Array) -> Array:
@@ -409,20 +409,25 @@ _TABLE = (
 )  # fmt: skip
 
 #: By name. trajectory.npz holds the saved ones in this order, optional ones last.
-QUANTITIES: dict[str, RecordedQuantity] = {one.name: one for one in _TABLE}
+QUANTITIES: dict[str, RecordedQuantity] = {quantity.name: quantity for quantity in _TABLE}
 
 
 def saved() -> list[RecordedQuantity]:
     """Those of the trajectory, in its file's order."""
-    those = [one for one in QUANTITIES.values() if one.saved]
-    return sorted(those, key=lambda one: one.optional)
+    quantities = [quantity for quantity in QUANTITIES.values() if quantity.saved]
+    return sorted(quantities, key=lambda quantity: quantity.optional)
 
 
 def placed() -> list[RecordedQuantity]:
     """All, in the order of columns and summaries."""
-    return sorted(QUANTITIES.values(), key=lambda one: one.place)
+    return sorted(QUANTITIES.values(), key=lambda quantity: quantity.place)
 
 
 def named_numbers() -> list[tuple[str, Number]]:
     """The numbers of quantities that tables of runs show, each with its unit."""
-    return [(number.unit or one.unit, number) for one in placed() for number in one.numbers if number.name]
+    return [
+        (number.unit or quantity.unit, number)
+        for quantity in placed()
+        for number in quantity.numbers
+        if number.name
+    ]

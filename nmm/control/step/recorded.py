@@ -20,7 +20,7 @@ from nmm.control.step.limit_rows import note_held_values, note_values
 from nmm.control.step.quantities import QUANTITIES
 
 #: The quantities that only a step knows: `note_sample` writes each.
-NOTED = tuple(one for one in QUANTITIES.values() if one.noted)
+NOTED = tuple(quantity for quantity in QUANTITIES.values() if quantity.noted)
 
 if TYPE_CHECKING:
     Recorded: TypeAlias = Any
@@ -29,15 +29,18 @@ else:
     Recorded = NamedTuple(
         "Recorded",
         [
-            (one.name, Annotated[Array, Kind(np.int64 if one.whole else np.float64, len(one.shape))])
-            for one in NOTED
+            (
+                quantity.name,
+                Annotated[Array, Kind(np.int64 if quantity.whole else np.float64, len(quantity.shape))],
+            )
+            for quantity in NOTED
         ],
     )
 
 
 def room(count: int, n: int, m: int, s: int, levels: int, limited: int) -> Recorded:
     sizes = {"N": count, "n": n, "m": m, "s": s, "l": levels, "w": limited}
-    return Recorded._make(one.room(sizes) for one in NOTED)
+    return Recorded._make(quantity.room(sizes) for quantity in NOTED)
 
 
 NOTE_SAMPLE = void(
@@ -48,47 +51,47 @@ NOTE_SAMPLE = void(
 
 @compiled
 def note_sample(
-    integers: Integers, floats: Array, q: Array, partitioned: int, share: float, k: int, found: Recorded
+    integers: Integers, floats: Array, q: Array, partitioned: int, share: float, k: int, record: Recorded
 ) -> None:
     """Write the sample just made at q, for which `share` of α was taken, as the k-th of a record."""
     e = views(ControlStep, integers, floats, BESIDE)
     b = views(LaidOut, integers, floats, 0).buffers
     n, m, s = q.shape[0], e.answer.u.shape[0], e.task.r.shape[0]
     for i in range(n):
-        found.q[k, i] = q[i]
-        found.q_dot[k, i] = e.q_dot[i]
+        record.q[k, i] = q[i]
+        record.q_dot[k, i] = e.q_dot[i]
     second = e.second.u_dot.shape[0] > 0
     for j in range(m):
-        found.u[k, j] = e.problem.before[j] if second else e.answer.u[j]
-        found.u_dot[k, j] = e.second.u_dot[j] if second else math.nan
+        record.u[k, j] = e.problem.before[j] if second else e.answer.u[j]
+        record.u_dot[k, j] = e.second.u_dot[j] if second else math.nan
     for i in range(s):
-        found.r[k, i] = e.task.r[i]
-        found.r_d[k, i] = e.task.r_d[i]
-        found.error[k, i] = e.task.error[i]
-        found.rate[k, i] = e.task.full[i] - e.second.lead[i] if second else e.task.full[i]
-        found.partition[k, i] = e.state[COLUMNS + i] if partitioned == 1 else -1
+        record.r[k, i] = e.task.r[i]
+        record.r_d[k, i] = e.task.r_d[i]
+        record.error[k, i] = e.task.error[i]
+        record.rate[k, i] = e.task.full[i] - e.second.lead[i] if second else e.task.full[i]
+        record.partition[k, i] = e.state[COLUMNS + i] if partitioned == 1 else -1
         for j in range(m):
-            found.J[k, i, j] = e.problem.J[i, j]
-    found.objective[k] = e.H[()]
-    found.residual[k] = e.answer.residual[()]
-    found.excess[k] = e.answer.excess[()]
-    found.step_size[k] = share
-    found.side[k] = int(e.answer.side[()])
-    found.added_residual[k] = added_residual(e.problem, e.answer.u)
-    for level in range(found.scale.shape[1]):
-        found.scale[k, level] = e.scale[level]
-    found.unanswered[k] = int(e.answer.status[()] == FALLBACK)
-    w = e.limits.spin.shape[0] if found.limited.shape[1] > 0 else 0
+            record.J[k, i, j] = e.problem.J[i, j]
+    record.objective[k] = e.H[()]
+    record.residual[k] = e.answer.residual[()]
+    record.excess[k] = e.answer.excess[()]
+    record.step_size[k] = share
+    record.side[k] = int(e.answer.side[()])
+    record.added_residual[k] = added_residual(e.problem, e.answer.u)
+    for level in range(record.scale.shape[1]):
+        record.scale[k, level] = e.scale[level]
+    record.unanswered[k] = int(e.answer.status[()] == FALLBACK)
+    w = e.limits.spin.shape[0] if record.limited.shape[1] > 0 else 0
     for i in range(w):
-        found.limited[k, i] = 0.0
+        record.limited[k, i] = 0.0
         for j in range(m):
-            found.limited[k, i] += e.problem.limit_rows[i, j] * found.u[k, j]
-    wide = found.limited.shape[1]
+            record.limited[k, i] += e.problem.limit_rows[i, j] * record.u[k, j]
+    wide = record.limited.shape[1]
     for i in range(w, min(wide, w + e.limits.rows.shape[0])):
-        found.limited[k, i] = b.value[e.limits.rows[i - w]]
+        record.limited[k, i] = b.value[e.limits.rows[i - w]]
     if wide > 0 and e.own_limits.shape[0] > 0:
-        u, u_dot = view(found.u, k * m, (m,)), view(found.u_dot, k * m, (m,))
-        note_values(q, u, u_dot, integers, floats, view(found.limited, k * wide, (wide,)))
+        u, u_dot = view(record.u, k * m, (m,)), view(record.u_dot, k * m, (m,))
+        note_values(q, u, u_dot, integers, floats, view(record.limited, k * wide, (wide,)))
 
 
 NOTE_HELD = void(
@@ -98,7 +101,7 @@ NOTE_HELD = void(
 
 
 @compiled
-def note_held(integers: Integers, floats: Array, q: Array, u: Array, k: int, found: Recorded) -> None:
+def note_held(integers: Integers, floats: Array, q: Array, u: Array, k: int, record: Recorded) -> None:
     """Of the k-th sample, at q: the inputs u (m,) that are held after it, in place of its own."""
     e = views(ControlStep, integers, floats, BESIDE)
     b = views(LaidOut, integers, floats, 0)
@@ -106,15 +109,15 @@ def note_held(integers: Integers, floats: Array, q: Array, u: Array, k: int, fou
     clear(G)
     clear(G_q)
     call_platform(b.platform_kernel, q, b.platform_numbers, G, G_q)
-    drive(u, G, e.arm, view(found.q_dot, k * q.shape[0], (q.shape[0],)))
+    drive(u, G, e.arm, view(record.q_dot, k * q.shape[0], (q.shape[0],)))
     for j in range(u.shape[0]):
-        found.u[k, j] = u[j]
-    for i in range(e.limits.spin.shape[0] if found.limited.shape[1] > 0 else 0):
-        found.limited[k, i] = dot(e.problem.limit_rows[i], u)
-    wide = found.limited.shape[1]
+        record.u[k, j] = u[j]
+    for i in range(e.limits.spin.shape[0] if record.limited.shape[1] > 0 else 0):
+        record.limited[k, i] = dot(e.problem.limit_rows[i], u)
+    wide = record.limited.shape[1]
     if wide > 0 and e.own_limits.shape[0] > 0:
-        held = view(found.u, k * u.shape[0], u.shape)
-        note_held_values(q, held, integers, floats, view(found.limited, k * wide, (wide,)))
+        held = view(record.u, k * u.shape[0], u.shape)
+        note_held_values(q, held, integers, floats, view(record.limited, k * wide, (wide,)))
 
 
 #: What no sample holds, as a float and as an integer.

@@ -94,10 +94,10 @@ class SafetyFilter:
         """Check the motion of the inputs found, and change them where it comes too near; before (m,) are the
         previous inputs, from which accelerations count."""
         self._keep.held[()] = 0
-        found, dt = self._step, float(self._step.problem.dt)
-        u = found.answer.u
+        step, dt = self._step, float(self._step.problem.dt)
+        u = step.answer.u
         self._lookout.look_ahead(t)
-        if not self._lookout.list_risky(found.q_dot, u, dt, anew=True):
+        if not self._lookout.list_risky(step.q_dot, u, dt, anew=True):
             return
         self._keep.held[()] = 1
         self._count("looked")
@@ -109,10 +109,10 @@ class SafetyFilter:
                 break
             if round_ == 0:
                 self._count("added")
-            found.problem.before[:] = before
+            step.problem.before[:] = before
             if self._again(q) >= Status.SINGULAR_J:
                 break
-            self._lookout.list_risky(found.q_dot, u, dt, anew=False)
+            self._lookout.list_risky(step.q_dot, u, dt, anew=False)
             short = self._lookout.first_short(t, q, u, dt)
         if short is not None:
             self._count("braked")
@@ -131,12 +131,12 @@ class SafetyFilter:
         best, least = wanted, short.by
         for share in SHARES:
             tried = rest + share * (wanted - rest)
-            found = self._lookout.first_short(t, q, tried, dt)
-            if found is None:
+            closest = self._lookout.first_short(t, q, tried, dt)
+            if closest is None:
                 best, least = tried, 0.0
                 break
-            if found.by < least:
-                best, least = tried, found.by
+            if closest.by < least:
+                best, least = tried, closest.by
         if least > 0.0 and self._lookout.sees_paths:
             best, least = self._give_way(t, q, before, best, least)
         if least > 0.0:

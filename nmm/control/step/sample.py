@@ -1,5 +1,7 @@
-"""What a call leaves for its sample's stages and the next call, as one snapshot: all fields of sampled kinds
-(`kernels/record_layout.py`). As they are never named here or in compiled code, new fields are included.
+"""Save and restore the controller's mutable state.
+
+It is what a call leaves for its sample's stages and the next call, as one snapshot: all fields of sampled
+kinds (`kernels/record_layout.py`). As none is named here or in compiled code, new fields are included.
 
 `evaluate`, `errors`, `without_limits` and an integrator's stages restore it; a step that is repeated, and a
 compiled loop that stops, return to their sample's; a run, and each of many rollouts, begins with `reset`.
@@ -57,7 +59,7 @@ class SampleState:
         self._limits.elapsed[()] = math.nan if elapsed is None else elapsed
 
     @contextmanager
-    def aside(self, mode: int | None = None) -> Iterator[None]:
+    def preserve_state(self, mode: int | None = None) -> Iterator[None]:
         """Restore the state after the block; meanwhile `mode` of limits, the current one by default."""
         usual, snapshot = int(self._limits.mode), self.snapshot()
         self._limits.mode[()] = usual if mode is None else mode

@@ -69,7 +69,11 @@ class Step:
     def __getitem__(self, name: str) -> Any:
         """A recorded quantity of this sample by name, computed where it needs no other samples."""
         own = self.by_name
-        known = {one.name: one.of for one in QUANTITIES.values() if one.name in own or one.of}
+        known = {
+            quantity.name: quantity.of
+            for quantity in QUANTITIES.values()
+            if quantity.name in own or quantity.of
+        }
         expect_known("quantity", name, known)
         of = known[name]
         if name in own or of is None:

@@ -19,7 +19,7 @@ from nmm.control.resolvers.answer import unanswered
 from nmm.control.resolvers.base import Resolver, State
 from nmm.control.resolvers.problem import Dimensions, Problem
 from nmm.control.resolvers.problem_arrays import LOWER, UPPER
-from nmm.control.resolvers.saturation import limit
+from nmm.control.resolvers.saturation import enforce_limits
 from nmm.control.retreat import Retreat, retreat_numbers
 from nmm.control.steering import NOTHING, Steered, Steering
 from nmm.control.step.acceleration import accelerate, write_next_limits
@@ -34,7 +34,7 @@ from nmm.model.collisions.rows import no_rows
 from nmm.model.robots.robot import Robot
 
 
-class Given(NamedTuple):
+class ControllerArguments(NamedTuple):
     """The arguments of a controller, in the order of its constructor."""
 
     robot: Robot
@@ -58,35 +58,35 @@ BESIDE_BY, BESIDE_BY_IN_PYTHON = 1e-6, 1e-4
 SERVO = 5.0
 
 
-def checked(given: Given) -> Given:
+def checked(arguments: ControllerArguments) -> ControllerArguments:
     """The same arguments; `InputError` for wrong kinds and combinations."""
     kinds = {"objective": Objective, "retreat": Retreat, "limits": Limits, "collisions": Collisions}
-    optional = {name: kind for name, kind in kinds.items() if getattr(given, name) is not None}
-    steering = {} if isinstance(given.steering, bool) else {"steering": Steering}
+    optional = {name: kind for name, kind in kinds.items() if getattr(arguments, name) is not None}
+    steering = {} if isinstance(arguments.steering, bool) else {"steering": Steering}
     for name, kind in ({"robot": Robot, "resolver": Resolver} | optional | steering).items():
-        expect_kind(getattr(given, name), kind, "controller", f"a {kind.__name__} as {name}")
-    expect_known("kinematics", given.kinematics, (PINOCCHIO, COMPILED), "controller")
-    if given.added_task.tasks and not given.resolver.takes_added_task:
-        raise InputError(f"resolver {given.resolver.name} takes none, ej does", where="added_task")
-    if given.order not in (1, 2):
-        raise InputError(where="order", expected="1, for inputs u, or 2, for u_dot", got=given.order)
-    if given.order == 2:
-        positive(given.servo, "servo")
-        if given.collisions is not None:
+        expect_kind(getattr(arguments, name), kind, "controller", f"a {kind.__name__} as {name}")
+    expect_known("kinematics", arguments.kinematics, (PINOCCHIO, COMPILED), "controller")
+    if arguments.added_task.tasks and not arguments.resolver.takes_added_task:
+        raise InputError(f"resolver {arguments.resolver.name} takes none, ej does", where="added_task")
+    if arguments.order not in (1, 2):
+        raise InputError(where="order", expected="1, for inputs u, or 2, for u_dot", got=arguments.order)
+    if arguments.order == 2:
+        positive(arguments.servo, "servo")
+        if arguments.collisions is not None:
             raise InputError(
                 "distances are checked along motions whose inputs are held, and at order 2 inputs accelerate",
                 where="collisions",
                 expected="order 1, or no collisions",
             )
-    return given
+    return arguments
 
 
-class LaidOut(NamedTuple):
+class ControllerLayout(NamedTuple):
     """What a controller computes with.
 
     program : the functions, in memory; step : what a step reads and writes besides them, as views
     dimensions, state : of the resolver's problem, and what the resolver remembers
-    kept : the limits
+    limits_on : the limits, resolved for the robot
     terms : the objective's, with weights
     steered : the steering law, if the equations have room for it
     """
@@ -95,31 +95,33 @@ class LaidOut(NamedTuple):
     step: ControlStep
     dimensions: Dimensions
     state: State
-    kept: LimitsOn
+    limits_on: LimitsOn
     terms: tuple[tuple[float, Function], ...]
     steered: Steered | None
 
 
-def lay_out(given: Given, steered: Steered | None) -> LaidOut:
+def lay_out(arguments: ControllerArguments, steered: Steered | None) -> ControllerLayout:
     """The memory of a `Controller`; `InputError` for what the robot lacks, or for too many rows."""
-    robot, task, resolver, objective, added_task, limits, *_ = given
-    collisions = given.collisions
+    robot, task, resolver, objective, added_task, limits, *_ = arguments
+    collisions = arguments.collisions
     limited = limits is not None or collisions is not None
-    second = given.order == 2
+    second = arguments.order == 2
     code, limits_code = (accelerate, write_next_limits) if second else (compiled_step, write_limits)
     rows, added_rows = task.rows(robot), added_task.rows(robot)
     weighted = () if objective is None else objective.terms_on(robot)
     functions, added = task_functions(task), task_functions(added_task)
-    kept = (Limits(False, False) if limits is None else limits).on(robot)
+    limits_on = (Limits(False, False) if limits is None else limits).on(robot)
     objectives = [function for _, function in weighted]
     pursued = [] if steered is None else [steered.pursuit]
     # At second order the rows that are differenced come first; their kinematics are compiled.
-    listed = [*functions, *added, *kept.functions, *objectives, *pursued]
-    kinematics = COMPILED if second else given.kinematics
-    program = Program(robot, listed, kinematics, [name for stage in kept.stages for name in stage.frames])
+    listed = [*functions, *added, *limits_on.functions, *objectives, *pursued]
+    kinematics = COMPILED if second else arguments.kinematics
+    program = Program(
+        robot, listed, kinematics, [name for stage in limits_on.stages for name in stage.frames]
+    )
     first = program.first_rows
     after = len(functions) + len(added)
-    objective_at = after + len(kept.functions)
+    objective_at = after + len(limits_on.functions)
     s, m = len(rows), robot.n_u
     # The extended Jacobian needs a row for each steered input to be square.
     held = np.zeros((0, m))
@@ -140,25 +142,25 @@ def lay_out(given: Given, steered: Steered | None) -> LaidOut:
         added_J=np.vstack([np.zeros((len(added_rows), m)), held]),
         added_rate=np.zeros(len(added_rows) + len(held)),
         added_row_scales=np.append(row_scales(added_rows, robot), np.ones(len(held))),
-        falling=-kept.changes[:, 0],
-        rising=kept.changes[:, 1],
-        limit_rows=np.zeros((len(kept.rows) + len(near.d), m)),
-        limit_levels=[*(task.place(priority) for priority in kept.priorities), *(0 for _ in near.d)],
+        falling=-limits_on.changes[:, 0],
+        rising=limits_on.changes[:, 1],
+        limit_rows=np.zeros((len(limits_on.rows) + len(near.d), m)),
+        limit_levels=[*(task.place(priority) for priority in limits_on.priorities), *(0 for _ in near.d)],
     )
-    arrays = problem.arrays._replace(limiter=limit.address if limited else 0)
-    numbers = kept.numbers(first[after : after + len(kept.functions)], robot)
+    arrays = problem.arrays._replace(limiter=enforce_limits.address if limited else 0)
+    numbers = limits_on.numbers(first[after : after + len(limits_on.functions)], robot)
     arrays.stops[m + len(numbers.spin) :] = UPPER + LOWER
-    arrays.stops[m + kept.first_own : m + len(kept.rows)] = 0  # those of speeds and forces
+    arrays.stops[m + limits_on.first_own : m + len(limits_on.rows)] = 0  # those of speeds and forces
     dimensions = problem.dimensions
     setup, state = resolver.setup(dimensions), resolver.start(dimensions)
-    differenced = len(kept.rows) + s + len(added_rows), objective_at
-    own_limits = _own_limits(kept, program)
+    differenced = len(limits_on.rows) + s + len(added_rows), objective_at
+    own_limits = _own_limits(limits_on, program)
     program.lay_out(
         ControlStep(
             near=near,
-            clearance=_clearance(collisions, len(kept.rows), len(near.d)),
-            task=task_rows(task, robot, first, kept.bounded),
-            added=task_rows(added_task, robot, first[len(functions) :], kept.bounded),
+            clearance=_clearance(collisions, len(limits_on.rows), len(near.d)),
+            task=task_rows(task, robot, first, limits_on.bounded),
+            added=task_rows(added_task, robot, first[len(functions) :], limits_on.bounded),
             arm=Arm(robot.arm_coordinates, robot.following.table.ravel()),
             terms=np.array(first[objective_at : objective_at + len(objectives)], dtype=np.int64),
             weights=np.array([weight for weight, _ in weighted]),
@@ -175,9 +177,9 @@ def lay_out(given: Given, steered: Steered | None) -> LaidOut:
             answer=unanswered(m, len(dimensions.levels)),
             scale=np.ones(len(dimensions.levels)),
             q_dot=np.zeros(robot.n),
-            retreat=retreat_numbers(given.retreat, robot, rows),
+            retreat=retreat_numbers(arguments.retreat, robot, rows),
             period=NOT_CALLED,
-            second=_second(given, program, first, differenced, kept.bounded) if second else _first(),
+            second=_second(arguments, program, first, differenced, limits_on.bounded) if second else _first(),
             t=np.array(0.0),
             own_limits=program.place_after(ControlStep)
             + header_length(LaidOutLimit) * np.arange(len(own_limits), dtype=np.int64),
@@ -192,14 +194,14 @@ def lay_out(given: Given, steered: Steered | None) -> LaidOut:
     if second and program.calls_python:
         step.second.h[()] = BESIDE_BY_IN_PYTHON
     state.memory = step.state
-    return LaidOut(program, step, dimensions, state, kept, weighted, steered)
+    return ControllerLayout(program, step, dimensions, state, limits_on, weighted, steered)
 
 
-def _own_limits(kept: LimitsOn, program: Program) -> list[LaidOutLimit]:
+def _own_limits(limits_on: LimitsOn, program: Program) -> list[LaidOutLimit]:
     """The limits with a kernel of their own; their rows come after those of wheels and functions."""
     laid = []
-    first = quantity = kept.first_own
-    for stage, count in zip(kept.stages, kept.counts, strict=True):
+    first = quantity = limits_on.first_own
+    for stage, count in zip(limits_on.stages, limits_on.counts, strict=True):
         ends = first, first + stage.rows, quantity, quantity + count
         addresses = stage.kernel.address, stage.values.address
         laid.append(
@@ -210,27 +212,27 @@ def _own_limits(kept: LimitsOn, program: Program) -> list[LaidOutLimit]:
 
 
 def _second(
-    given: Given,
+    arguments: ControllerArguments,
     program: Program,
     first: list[int],
     differenced: tuple[int, int],
     bounded: tuple[str, ...],
 ) -> SecondOrder:
-    robot, (rows, functions) = given.robot, differenced
+    robot, (rows, functions) = arguments.robot, differenced
     n, m = robot.n, robot.n_u
     stages, buffers = program.rows_of(functions)
     return SecondOrder(
-        servo=np.array(float(given.servo)),
+        servo=np.array(float(arguments.servo)),
         h=np.array(BESIDE_BY),
         share=np.array(1.0),
         stages=stages,
         buffers=buffers,
-        task=task_rows(given.task, robot, first, bounded),
-        added=task_rows(given.added_task, robot, first[len(task_functions(given.task)) :], bounded),
+        task=task_rows(arguments.task, robot, first, bounded),
+        added=task_rows(arguments.added_task, robot, first[len(task_functions(arguments.task)) :], bounded),
         beside=np.zeros(n),
         y=np.zeros((3, rows)),
         D=np.zeros(rows),
-        lead=np.zeros(sum(given.task.levels(robot))),
+        lead=np.zeros(sum(arguments.task.levels(robot))),
         lower=np.full(m, -np.inf),
         upper=np.full(m, np.inf),
         u_dot=np.zeros(m),
@@ -249,14 +251,14 @@ def _first() -> SecondOrder:
 
 
 def _clearance(collisions: Collisions | None, first: int, count: int) -> Clearance:
-    kept = Collisions() if collisions is None else collisions
+    settings = Collisions() if collisions is None else collisions
     return Clearance(
         first=np.array(first, dtype=np.int64),
-        distance=np.array(kept.distance),
+        distance=np.array(settings.distance),
         margin=np.array(MARGIN),
-        gain=np.array(kept.gain),
-        recovery=np.array(kept.recovery),
-        braking=np.array(np.nan if kept.braking is None else kept.braking),
+        gain=np.array(settings.gain),
+        recovery=np.array(settings.recovery),
+        braking=np.array(np.nan if settings.braking is None else settings.braking),
         least=np.full(count, -np.inf),
         held=np.array(0),
         counts=np.zeros(len(Counts._fields), dtype=np.int64),

@@ -95,7 +95,7 @@ class Descent(NamedTuple):
     rows, weights (k,) : H is the sum of weights[i] times the program's row rows[i]
     alpha_at, whole () : where α is among the resolver's numbers, and its full value
     turn () : of the search; value (), size () : of H at q, and the size of its terms
-    share () : of α, in the trial; slope () : along its motion (n,), which leads to `there` (n,)
+    share () : of α, in the trial; slope () : along its motion (n,), which leads to `q_trial` (n,)
     u, rest (m,), q_dot, resting (n,) : inputs of the trial and without the gradient, and their motions
     asked_integers, asked : the sampled numbers for the full α
     """
@@ -110,7 +110,7 @@ class Descent(NamedTuple):
     share: Cell
     slope: Cell
     motion: Vector
-    there: Vector
+    q_trial: Vector
     u: Vector
     rest: Vector
     q_dot: Vector
@@ -134,7 +134,7 @@ SEARCH = boolean(
 
 @compiled
 def search(q: Array, integers: Integers, floats: Array, own_integers: Integers, own_floats: Array) -> bool:
-    """One turn of the search for α; True where H is to be evaluated at `there` for the next turn.
+    """One turn of the search for α; True where H is to be evaluated at `q_trial` for the next turn.
 
     The first turn, after the step with the full α, finds the answer without the gradient; the second knows H
     at q; each later one knows H at the end of a trial's motion, and accepts α or shortens it.
@@ -153,7 +153,7 @@ def search(q: Array, integers: Integers, floats: Array, own_integers: Integers, 
         resolve(q, integers, floats)
         answered(e, own.rest, own.resting)
         own.share[()] = 1.0
-        copied(q, own.there)
+        copied(q, own.q_trial)
         clear(own.motion)
         return True
     b = views(LaidOut, own_integers, own_floats, 0).buffers
@@ -180,8 +180,8 @@ def search(q: Array, integers: Integers, floats: Array, own_integers: Integers, 
         answered(e, own.u, own.q_dot)
     dt = e.problem.dt[()]
     own.slope[()] = apart(e.problem.h, own.u, own.rest, own.q_dot, own.resting, dt, own.motion)
-    copied(q, own.there)
-    add(own.there, 1.0, own.motion)
+    copied(q, own.q_trial)
+    add(own.q_trial, 1.0, own.motion)
     return True
 
 
@@ -199,14 +199,14 @@ def shorten(
     own = views(Descent, own_integers, own_floats, BESIDE)
     own.turn[()] = 0
     while search(q, integers, floats, own_integers, own_floats):
-        run_program(t, own.there, own_integers, own_floats)
+        run_program(t, own.q_trial, own_integers, own_floats)
 
 
 class StepSize:
     """α of a controller's resolver, chosen anew at each sample; `InputError` without α or terms.
 
     terms : [(weight, function, row)] of H, the sum of weight times the function's row
-    found, blocks : the control step in memory
+    step, blocks : the control step in memory
     """
 
     def __init__(
@@ -214,7 +214,7 @@ class StepSize:
         robot: Robot,
         resolver: Resolver,
         terms: Sequence[tuple[float, Function, int]],
-        found: ControlStep,
+        step: ControlStep,
         blocks: Blocks,
     ) -> None:
         if resolver.alpha_at is None:
@@ -225,7 +225,7 @@ class StepSize:
         self._program = Program(robot, [function for _, function, _ in terms], COMPILED)
         rows = zip(self._program.first_rows, terms, strict=True)
         self._blocks, n, m = blocks, robot.n, robot.n_u
-        self._alpha = found.numbers[resolver.alpha_at : resolver.alpha_at + 1]
+        self._alpha = step.numbers[resolver.alpha_at : resolver.alpha_at + 1]
         self._whole = float(self._alpha[0])
         asked_integers, asked = sampled(*blocks)
         own = Descent(
@@ -239,7 +239,7 @@ class StepSize:
             share=np.array(0.0),
             slope=np.array(0.0),
             motion=np.zeros(n),
-            there=np.zeros(n),
+            q_trial=np.zeros(n),
             u=np.zeros(m),
             rest=np.zeros(m),
             q_dot=np.zeros(n),
@@ -273,11 +273,11 @@ class StepSize:
         if self.compiled:
             self._whole_search(t, q, *blocks)
             return
-        turn, there = self._turn, self._own.there
+        turn, q_trial = self._turn, self._own.q_trial
         self._own.turn[()] = 0
         while turn(q, *blocks):
-            program.prepare(t, there)
-            run_program(t, there, *program.blocks)
+            program.prepare(t, q_trial)
+            run_program(t, q_trial, *program.blocks)
 
     @cached_property
     def _whole_search(self) -> Callable[..., None]:

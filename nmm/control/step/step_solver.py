@@ -20,7 +20,7 @@ from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.record_layout import Blocks
 from nmm.control.directions import failure
 from nmm.control.functions.function import Row
-from nmm.control.functions.program import nothing
+from nmm.control.functions.program import no_preparation
 from nmm.control.limits.bounds import OFF, SAMPLE, STAGE
 from nmm.control.period_monitor import PeriodMonitor
 from nmm.control.resolvers.answer import Status
@@ -53,7 +53,7 @@ from nmm.control.step.recorded import OneSample, Recorded
 from nmm.control.step.safety_filter import SafetyFilter
 from nmm.control.step.sample import SampleState
 from nmm.control.step.step import Step
-from nmm.control.step.step_layout import Given, lay_out
+from nmm.control.step.step_layout import ControllerArguments, lay_out
 from nmm.control.step.step_size import StepSize
 from nmm.control.step.stepping import write_errors
 from nmm.model.collisions.scene import Scene
@@ -95,7 +95,7 @@ class StepSolver:
     busy : one flag, in a list that the controller shares: whether a call is in progress
     """
 
-    def __init__(self, given: Given, steered: Steered | None) -> None:
+    def __init__(self, given: ControllerArguments, steered: Steered | None) -> None:
         robot, collisions, retreat, resolver = given.robot, given.collisions, given.retreat, given.resolver
         self.robot, self.task, self.added_task = robot, given.task, given.added_task
         self.resolver, self.objective = resolver, given.objective
@@ -103,23 +103,23 @@ class StepSolver:
         self.rows: tuple[Row, ...] = given.task.rows(robot)
         self.scene: Scene | None = None if collisions is None else collisions.on(robot)
         laid = lay_out(given, steered)
-        self.program, self.found, self.dimensions = laid.program, laid.step, laid.dimensions
+        self.program, self.step_memory, self.dimensions = laid.program, laid.step, laid.dimensions
         self.state: State = laid.state
-        self.limits_on, self._steerable, self._terms = laid.kept, laid.steered, laid.terms
+        self.limits_on, self._steerable, self._terms = laid.limits_on, laid.steered, laid.terms
         self.steered: Steered | None = None
-        self.before = self.found.problem.before
-        self.sample = SampleState(self.blocks, self.found)
-        self.report = LimitReport(robot, self.limits_on, self.scene, self.found, self.program)
+        self.before = self.step_memory.problem.before
+        self.sample = SampleState(self.blocks, self.step_memory)
+        self.report = LimitReport(robot, self.limits_on, self.scene, self.step_memory, self.program)
         self.safety_filter: SafetyFilter | None = None
         if self.scene is not None and collisions is not None:
-            given_to = self.scene, self.found, self.program, self._again(), collisions.horizon
-            self.safety_filter = SafetyFilter(*given_to)
+            arguments = self.scene, self.step_memory, self.program, self._again(), collisions.horizon
+            self.safety_filter = SafetyFilter(*arguments)
         self.second = given.order == 2
         if given.limits is None and collisions is None:
-            self.found.limits.mode[()] = OFF
+            self.step_memory.limits.mode[()] = OFF
         self.retreat_state: RetreatState | None = None
         if retreat is not None:
-            self.retreat_state = RetreatState(retreat, robot, self.found.retreat)
+            self.retreat_state = RetreatState(retreat, robot, self.step_memory.retreat)
             self._watch_error = checked_by_caller(watch_error, WATCH)
             self.load_stop()
         self._wanted: Array | None = None
@@ -131,7 +131,7 @@ class StepSolver:
             or (given.limits is not None and (self.second or self.limits_on.needs_dt))
         )
         self.samples = given.limits is not None or self.needs_dt or self.program.remembers
-        self.period_monitor = PeriodMonitor(self.found.period)
+        self.period_monitor = PeriodMonitor(self.step_memory.period)
         self.dt: float | None = None
         self.busy = [False]
         limited = 0 if given.limits is None else len(self.limits_on.row_limits)
@@ -142,13 +142,13 @@ class StepSolver:
         """Adopt the law where its inputs do not affect the task; then set up the choice of α, if any."""
         if self._steerable is not None and unfelt(self._steerable):
             self.steered = self._steerable
-        self.found.steering.on[()] = int(self.steered is not None)
+        self.step_memory.steering.on[()] = int(self.steered is not None)
         if self.resolver.step != "constant":
             descended = [(weight, function, 0) for weight, function in self._terms]
             if descended and self.steered is not None:
-                spring = float(self.found.steering.spring)
+                spring = float(self.step_memory.steering.spring)
                 descended.append((spring, self.steered.pursuit, len(self.steered.inputs)))
-            self.step_size = StepSize(self.robot, self.resolver, descended, self.found, self.blocks)
+            self.step_size = StepSize(self.robot, self.resolver, descended, self.step_memory, self.blocks)
 
     def _solve_calls(self) -> None:
         """Define `solve(t, q)` -> status, and `linearise`, which omits the resolver's Python part."""
@@ -157,41 +157,41 @@ class StepSolver:
         prepare = self.program.prepare if self.safety_filter is None else self._measured(self.safety_filter)
 
         def solve(t: float, q: Array) -> float:
-            if prepare is not nothing:
+            if prepare is not no_preparation:
                 prepare(t, q)
             return step(t, q, integers, floats)
 
-        python = self.second and prepare is not nothing
-        one: Callable[[float, Array], float] = self._beside_by_python(prepare) if python else solve
+        python = self.second and prepare is not no_preparation
+        linearise: Callable[[float, Array], float] = self._beside_by_python(prepare) if python else solve
 
         def solve_and_finish(t: float, q: Array) -> float:
-            one(t, q)
+            linearise(t, q)
             return self._finished(q)
 
-        self.linearise: Callable[[float, Array], float] = one
-        self.solve: Callable[[float, Array], float] = one if self._whole else solve_and_finish
+        self.linearise: Callable[[float, Array], float] = linearise
+        self.solve: Callable[[float, Array], float] = linearise if self._whole else solve_and_finish
         self._plain_call = prepare, step, integers, floats
 
     def _beside_by_python(self, prepare: Callable[[float, Array], None]) -> Callable[[float, Array], float]:
         """`accelerate` with users' Python functions, which are called at each of its three places."""
-        beside, blocks = self.found.second.beside, self.blocks
+        beside, blocks = self.step_memory.second.beside, self.blocks
 
         def solve(t: float, q: Array) -> float:
             prepare(t, q)
             look_here(t, q, *blocks)
             for side in (BEHIND, AHEAD):
-                there = t + go_beside(q, side, *blocks)
-                prepare(there, beside.copy())
-                look_beside(there, q, side, *blocks)
+                t_side = t + go_beside(q, side, *blocks)
+                prepare(t_side, beside.copy())
+                look_beside(t_side, q, side, *blocks)
             return float(answer_led(q, *blocks))
 
         return solve
 
     def _finished(self, q: Array) -> float:
         """The status after the resolver's Python part, if any, and what a step does with its inputs."""
-        answer = self.found.answer
+        answer = self.step_memory.answer
         if not self._whole:
-            self.resolver.finish(self.found.problem, self.dimensions, answer)
+            self.resolver.finish(self.step_memory.problem, self.dimensions, answer)
             finish(q, *self.blocks)
             if self.second:
                 follow_answer(*self.blocks)
@@ -199,7 +199,7 @@ class StepSolver:
 
     def _measured(self, safety_filter: SafetyFilter) -> Callable[[float, Array], None]:
         """`prepare` of the program, and distances at samples."""
-        prepare, mode = self.program.prepare, self.found.limits.mode
+        prepare, mode = self.program.prepare, self.step_memory.limits.mode
 
         def prepared(t: float, q: Array) -> None:
             prepare(t, q)
@@ -220,7 +220,7 @@ class StepSolver:
             self._finished(q)
             if self.retreat_state is not None and self.retreat_state.now:
                 self._replace_by(self._retreating(self.retreat_state, q))
-            return float(self.found.answer.status[()])
+            return float(self.step_memory.answer.status[()])
 
         return again
 
@@ -252,26 +252,30 @@ class StepSolver:
 
     def take_stop(self, t: float, q: Array) -> None:
         """`take_nearest` to rest; beyond a limit the robot stays where it is and does not return."""
-        returns = self.found.limits.recovery, self.found.clearance.recovery, self.found.clearance.margin
-        usual = [one.copy() for one in returns]
-        for one in returns:
-            one[()] = 0.0
+        returns = (
+            self.step_memory.limits.recovery,
+            self.step_memory.clearance.recovery,
+            self.step_memory.clearance.margin,
+        )
+        usual = [number.copy() for number in returns]
+        for number in returns:
+            number[()] = 0.0
         try:
             self.take_nearest(t, q, np.zeros(self.robot.n_u))
         finally:
-            for one, value in zip(returns, usual, strict=True):
-                one[()] = value
+            for number, value in zip(returns, usual, strict=True):
+                number[()] = value
 
     def _replace_by(self, wanted: Array, *, stage: bool = False) -> None:
         """Inputs within the limits nearest to `wanted` (m,), at order 2 those at the sample's end, in place
         of the resolver's."""
         if self.second:  # it follows its answer by this share within a sample
-            wanted = self.before + (wanted - self.before) / self.found.second.share
+            wanted = self.before + (wanted - self.before) / self.step_memory.second.share
         self._replace_inputs(wanted, *self.blocks)
         if self.second:
             follow_answer(*self.blocks)
         elif not stage:
-            self.before[:] = self.found.answer.u
+            self.before[:] = self.step_memory.answer.u
 
     def load_stop(self) -> None:
         """Load what stops and retreats need, which else takes 25 ms within a control loop."""
@@ -289,11 +293,11 @@ class StepSolver:
         self.step_size.share = 1.0
         self.solve(t, q)
         self.step_size.shorten(t, q)
-        return float(self.found.answer.status[()])
+        return float(self.step_memory.answer.status[()])
 
     def solve_stage(self, t: float, q: Array) -> None:
         """A stage after a sample, whose bounds, step size and retreat hold."""
-        mode = self.found.limits.mode
+        mode = self.step_memory.limits.mode
         usual = int(mode)
         mode[()] = STAGE if usual == SAMPLE else usual
         self.program.stands[()] = 1
@@ -316,23 +320,23 @@ class StepSolver:
 
     def inputs_at(self, t: float, q: Array) -> Array:
         """The inputs u (m,) of `at_stage`."""
-        with self.alone():
+        with self.exclusive():
             self.at_stage(t, q)
-            return self.found.answer.u.copy()
+            return self.step_memory.answer.u.copy()
 
     def count_from(self, held: Array) -> None:
         """Accelerations count from the inputs (m,) that are held after the sample."""
-        if self.found.limits.mode == SAMPLE:
+        if self.step_memory.limits.mode == SAMPLE:
             self.before[:] = held
 
     def _retreating(self, retreat_state: RetreatState, q: Array) -> Array:
-        return retreat_state.inputs(q, self.program.buffers.G, self.found.problem)
+        return retreat_state.inputs(q, self.program.buffers.G, self.step_memory.problem)
 
     def begin_run(self) -> None:
         """A run begins: nothing is remembered, and numbers that runs replace are the first ones."""
         self.sample.reset()
-        for one in self.program.renewals:
-            one.begin()
+        for renewal in self.program.renewals:
+            renewal.begin()
 
     @property
     def blocks(self) -> Blocks:
@@ -363,12 +367,12 @@ class StepSolver:
         """`with solver.compiled() as blocks:` compiled kinematics for compiled steps; no other thread may
         call.
         """
-        with self.alone(), self.program.compiled_kinematics():
+        with self.exclusive(), self.program.compiled_kinematics():
             yield self.blocks
 
     @contextmanager
-    def alone(self) -> Iterator[None]:
-        """`with solver.alone():` other threads that call meanwhile get a `RunError`."""
+    def exclusive(self) -> Iterator[None]:
+        """`with solver.exclusive():` other threads that call meanwhile get a `RunError`."""
         self.begin()
         try:
             yield
@@ -388,11 +392,13 @@ class StepSolver:
     def keep_dt(self, dt: float | None) -> None:
         """Set the time between two calls, s."""
         self.dt = None if dt is None else positive(dt, "dt")
-        if self.second and self.needs_dt and dt is not None and dt * self.found.second.servo > 1.0:
+        if self.second and self.needs_dt and dt is not None and dt * self.step_memory.second.servo > 1.0:
             raise InputError(
-                where="servo", expected=f"at most 1 / dt, {1 / dt:g} 1/s", got=float(self.found.second.servo)
+                where="servo",
+                expected=f"at most 1 / dt, {1 / dt:g} 1/s",
+                got=float(self.step_memory.second.servo),
             )
-        self.found.problem.dt[()] = math.nan if self.dt is None else self.dt
+        self.step_memory.problem.dt[()] = math.nan if self.dt is None else self.dt
         self.period_monitor.keep(dt)
 
     def expect_dt(self) -> None:
@@ -407,15 +413,23 @@ class StepSolver:
     @property
     def failed(self) -> bool:
         """Whether the last call gave no inputs."""
-        return bool(self.found.answer.status >= FAILED)
+        return bool(self.step_memory.answer.status >= FAILED)
 
     def failure(self, t: float, q: Array) -> SingularError:
         """Why the last call, at (t, q), gave no inputs; `InputError` for a t or q that is not finite."""
         self.robot.q(q)
         scalar(t, "t")
-        status = Status(int(self.found.answer.status[()]))
-        given = status, self.found.problem, self.robot, self.task, float(t), q, self.limits_on.functions
-        return SingularError(failure(*given))
+        status = Status(int(self.step_memory.answer.status[()]))
+        details = (
+            status,
+            self.step_memory.problem,
+            self.robot,
+            self.task,
+            float(t),
+            q,
+            self.limits_on.functions,
+        )
+        return SingularError(failure(*details))
 
     def errors(self, times: Array, configurations: Array) -> tuple[Array, Array]:
         """The task's errors e and ∂g/∂t + K e (without bounds of feedback) at times (N,) and q (N, n).
@@ -427,16 +441,16 @@ class StepSolver:
         (N, s) each, in the units of the rows, and those per second; NaN where a user's function raises
         """
         self.expect_dt()
-        task = self.found.task
+        task = self.step_memory.task
         error, rate = (np.full((len(times), len(self.rows)), np.nan) for _ in range(2))
         if not self.program.calls_python:
             at = np.array(times, dtype=np.float64), np.array(configurations, dtype=np.float64, order="C")
-            with self.sample.aside(), self.compiled() as blocks:
+            with self.sample.preserve_state(), self.compiled() as blocks:
                 for first in range(0, len(times), AT_ONCE):
                     some = slice(first, first + AT_ONCE)
-                    write_errors(*blocks, *(one[some] for one in (*at, error, rate)))
+                    write_errors(*blocks, *(array[some] for array in (*at, error, rate)))
             return error, rate
-        with self.alone(), self.sample.aside():
+        with self.exclusive(), self.sample.preserve_state():
             for k, q in enumerate(np.ascontiguousarray(configurations, dtype=np.float64)):
                 try:
                     self.solve(float(times[k]), q)
@@ -448,22 +462,22 @@ class StepSolver:
     @property
     def derivatives(self) -> tuple[Array, Array, Array]:
         """Derivatives by the inputs in the last call, views: J (s, m), the added task's (k, m), h (1, m)."""
-        problem = self.found.problem
+        problem = self.step_memory.problem
         return problem.J, problem.added_J, problem.h[np.newaxis]
 
     def without_limits(self) -> AbstractContextManager[None]:
         """`with solver.without_limits():` answers as without limits; the state is then restored."""
-        return self.sample.aside(OFF)
+        return self.sample.preserve_state(OFF)
 
     def last(self, t: float, q: Array) -> Step:
         """The quantities of the call just made at (t, q), as copies."""
-        answer, share = self.found.answer, 1.0 if self.step_size is None else self.step_size.share
+        answer, share = self.step_memory.answer, 1.0 if self.step_size is None else self.step_size.share
         noted = self._one_sample.noted(q, share)
         noted["partition"] = self.state.partition(len(self.rows))  # states of users are Python's
         more = {name: noted.pop(name) for name in _WITHOUT_ATTRIBUTE}
         others: dict[str, Any] = {
             "t": float(t),
-            "h": self.found.problem.h.copy(),
+            "h": self.step_memory.problem.h.copy(),
             "status": Status(int(answer.status[()])),
             "measure": float(answer.measure[()]),
             "retreats": 0 if self.retreat_state is None else self.retreat_state.count,

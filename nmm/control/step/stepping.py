@@ -37,7 +37,7 @@ ADVANCE = float64(*(float64, float64, _FLAT, int64[::1], _FLAT), *(record_type(T
 
 
 def tableau(integrator: Integrator) -> Tableau | None:
-    """The integrator's tableau, or None; `go_on` sets mimic joints in any case."""
+    """The integrator's tableau, or None; `integrate_step` sets mimic joints in any case."""
     if isinstance(integrator, ZeroOrderHold) and not integrator.at_middle:
         return Tableau(np.zeros(0), np.zeros((0, 0)), np.zeros(0), 0)
     if isinstance(integrator, ZeroOrderHold):
@@ -62,7 +62,7 @@ def hold_inputs(q: Array, u: Array, dt: float, integers: Integers, floats: Array
 
 
 @compiled
-def go_on(
+def integrate_step(
     t: float, dt: float, q: Array, integers: Integers, floats: Array, method: Tableau, q_next: Array
 ) -> float:
     """q_next (n,): q at t + dt, from the sample just made at (t, q); returns the first failed stage's status,
@@ -162,12 +162,12 @@ def advance(
     if status >= SINGULAR_J:
         return status
     if method.weights.shape[0] < 2:  # no stages besides the sample
-        go_on(t, dt, q, integers, floats, method, q_next)
+        integrate_step(t, dt, q, integers, floats, method, q_next)
         return status
     count, size = kept(integers, floats)
     left_integers, left = integer_scratch(count), scratch(size)
     keep(integers, floats, left_integers, left)
-    failed = go_on(t, dt, q, integers, floats, method, q_next)
+    failed = integrate_step(t, dt, q, integers, floats, method, q_next)
     end_stages(integers, floats, left_integers, left, method, u)
     if failed >= SINGULAR_J:
         e.answer.status[()] = failed

@@ -202,7 +202,7 @@ def judge(leg: Leg, dt: float, method: str, goal: Goal | None) -> Judged:
     """Judge a leg; one that reached its goal may be above its decay. An interrupt only loses findings."""
     ended = leg.ended
     try:
-        with leg.controller.solver.sample.aside():  # the controller stays as the run left it
+        with leg.controller.solver.sample.preserve_state():  # the controller stays as the run left it
             return _judged(leg, dt, method, goal)
     except KeyboardInterrupt:
         if ended.outcome is Outcome.COMPLETED:

@@ -27,9 +27,9 @@ class LoopInputs:
 
     def _accept(self) -> None:
         """The inputs that the solver has just computed become u."""
-        solver, second = self._solver, self._solver.found.second
+        solver, second = self._solver, self._solver.step_memory.second
         if not solver.second:
-            self.u = solver.found.answer.u.copy()
+            self.u = solver.step_memory.answer.u.copy()
             return
         self.u = solver.before + self._period * second.u_dot
         if np.isfinite(self.u).all():
@@ -82,6 +82,6 @@ class LoopInputs:
         """u (m,) in place of the solver's."""
         solver = self._solver
         self.u = u.copy()
-        solver.found.answer.u[:] = solver.before[:] = u
-        solver.found.second.u_dot[:] = 0.0
-        solver.found.q_dot[:] = solver.robot.S(q) @ u
+        solver.step_memory.answer.u[:] = solver.before[:] = u
+        solver.step_memory.second.u_dot[:] = 0.0
+        solver.step_memory.q_dot[:] = solver.robot.S(q) @ u

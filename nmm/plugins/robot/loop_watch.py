@@ -55,7 +55,7 @@ class LoopWatch:
     def look_for_blocking(self, t: float, running: bool) -> None:
         """Whether distances have blocked the robot for long, which runs, or has yet to."""
         solver = self._controller.solver
-        if not running or solver.scene is None or solver.found.answer.nu.min() >= BLOCKED:
+        if not running or solver.scene is None or solver.step_memory.answer.nu.min() >= BLOCKED:
             self._free_at = t
         elif t - self._free_at > BLOCKED_FOR:
             for pair in self._controller.report.blocking():
@@ -66,7 +66,7 @@ class LoopWatch:
         if self._error is None:
             return False
         solver = self._controller.solver
-        m, rad = norms(solver.found.task.error, unit_codes(solver.rows))
+        m, rad = norms(solver.step_memory.task.error, unit_codes(solver.rows))
         off = m > self._error[0] or rad > self._error[1]
         if off:
             self._found.add("off_task", t, m=m, rad=rad)

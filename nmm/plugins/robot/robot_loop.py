@@ -221,7 +221,7 @@ class Loop:
             self._begin_stop("measurements_ended")
         self._answer()
         self._log.add(self.t, self._measured.q)
-        self._measured.history.give(self.t, self.u, self.controller.solver.found.q_dot)
+        self._measured.history.give(self.t, self.u, self.controller.solver.step_memory.q_dot)
         return self.u.copy()
 
     def _answer(self) -> None:

@@ -45,7 +45,7 @@ def test_the_oracle_of_these_tests_sees_zeros_that_are_sent() -> None:
     stops = loop.controller.solver.take_stop
     loop.controller.solver.take_stop = lambda t, q: (  # type: ignore[method-assign]
         stops(t, q),
-        loop.controller.solver.found.answer.u.fill(0.0),
+        loop.controller.solver.step_memory.answer.u.fill(0.0),
     )
     assert drive(loop, measure=lambda t, q: (q if t < BEGINS else None, t)).broken > 0.05
 
