@@ -309,7 +309,7 @@ def evaluate(function: Function, t: float, configuration: Configuration) -> Eval
 def _with_callbacks(
     robot: Robot, update: Callable[[float, Array], None], callbacks: Sequence[tuple[Callback, Array]]
 ) -> Callable[[float, Array], None]:
-    """`update`, then the users' Python functions, whose results go where their kernels read them."""
+    """Return `update` followed by users' Python functions, whose results go where their kernels read them."""
 
     def prepare(t: float, q: Array) -> None:
         update(t, q)

@@ -3,7 +3,7 @@ possible.
 
 For one level of priority: the largest λ in [0, 1] with J u = r0 + λ (J u* - r0) and u within the limits, then
 the least ‖B (u - u*)‖. u* is the resolver's own answer, returned unchanged if within the limits, B its
-metric, r0 = J u_ref, with u_ref the inputs nearest to rest, or those of the levels above: λ
+metric, r0 = J u_ref, with u_ref the inputs within the limits nearest to rest, or those of the levels above: λ
 = 0 is always possible. α h is part of u*, never scaled, only projected. Soft limits are rows placed among the
 levels: they are kept as far as the levels above allow, widened by the least number that makes this possible,
 and hold, so widened, for the levels below.

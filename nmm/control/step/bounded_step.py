@@ -25,7 +25,7 @@ from nmm.control.step.limit_rows import write_rows
 
 @kernel(BOUNDS)
 def write_limits(q: Array, integers: Integers, floats: Array) -> None:
-    """Bounds and rows of inputs, wheels and functions; at a stage the sample's bounds stay."""
+    """Write bounds and rows of inputs, wheels and functions; at a stage the sample's bounds stay."""
     b = views(LaidOut, integers, floats, 0).buffers
     e = views(ControlStep, integers, floats, BESIDE)
     limits, problem = e.limits, e.problem
@@ -49,7 +49,7 @@ def write_limits(q: Array, integers: Integers, floats: Array) -> None:
 
 @kernel(BOUNDS)
 def write_clearance(q: Array, integers: Integers, floats: Array) -> None:
-    """Rows and bounds of distances; a stage keeps its sample's bounds and gradients, but has its own S."""
+    """Write rows and bounds of distances; a stage keeps its sample's bounds and gradients, not its S."""
     b = views(LaidOut, integers, floats, 0).buffers
     e = views(ControlStep, integers, floats, BESIDE)
     count, n = e.near.d_q.shape

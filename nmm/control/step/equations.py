@@ -211,7 +211,7 @@ def write_shares(task: TaskRows, problem: ProblemArrays, answer: AnswerArrays, s
 
 @compiled
 def finish(q: Array, integers: Integers, floats: Array) -> None:
-    """From the resolver's inputs to the robot's: limits, the steering law, q_dot."""
+    """Apply the limits and the steering law to the resolver's inputs, and write q_dot."""
     b = views(LaidOut, integers, floats, 0).buffers
     e = views(ControlStep, integers, floats, BESIDE)
     keep_limits(e.problem, e.answer)
@@ -227,7 +227,7 @@ def finish(q: Array, integers: Integers, floats: Array) -> None:
 
 @compiled
 def resolve(q: Array, integers: Integers, floats: Array) -> float:
-    """The resolver's inputs, within limits, for the equations in memory; returns its status."""
+    """Compute the resolver's inputs, within limits, for the equations in memory; returns the status."""
     e = views(ControlStep, integers, floats, BESIDE)
     if e.clearance_code != 0:
         call_bounds(e.clearance_code, q, integers, floats)
@@ -248,7 +248,7 @@ def resolve(q: Array, integers: Integers, floats: Array) -> float:
 
 @compiled
 def write_problem(t: float, q: Array, integers: Integers, floats: Array) -> None:
-    """Functions (except Pinocchio's), equations and the gradient at (t, q)."""
+    """Evaluate the functions (except Pinocchio's), the equations and the gradient at (t, q)."""
     run_program(t, q, integers, floats)
     b = views(LaidOut, integers, floats, 0).buffers
     e = views(ControlStep, integers, floats, BESIDE)
@@ -275,7 +275,7 @@ def write_problem(t: float, q: Array, integers: Integers, floats: Array) -> None
 
 @kernel(STEP)
 def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
-    """One control step: functions, equations, gradient, inputs; returns the status."""
+    """Compute one control step: functions, equations, gradient, inputs; returns the status."""
     write_problem(t, q, integers, floats)
     e = views(ControlStep, integers, floats, BESIDE)
     if e.limits_code != 0:

@@ -60,7 +60,7 @@ def elapsed_of(e: ControlStep) -> float:
 def write_limit(
     limit: LaidOutLimit, t: float, q: Array, q_dot: Array, e: ControlStep, b: Buffers, rows: LimitRows
 ) -> None:
-    """The rows of one limit at (t, q), with the kinematics in b."""
+    """Write the rows of one limit at (t, q), with the kinematics in b."""
     clear(rows.A)
     for i in range(rows.lower.shape[0]):
         rows.lower[i], rows.upper[i] = -math.inf, math.inf

@@ -102,7 +102,7 @@ NOTE_HELD = void(
 
 @compiled
 def note_held(integers: Integers, floats: Array, q: Array, u: Array, k: int, record: Recorded) -> None:
-    """Of the k-th sample, at q: the inputs u (m,) that are held after it, in place of its own."""
+    """Replace the inputs of the k-th sample, at q, by those u (m,) that are held after it."""
     e = views(ControlStep, integers, floats, BESIDE)
     b = views(LaidOut, integers, floats, 0)
     G, G_q = scratch(b.buffers.G.shape), scratch((*b.buffers.G.shape, b.buffers.G.shape[0]))

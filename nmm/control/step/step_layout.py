@@ -59,7 +59,7 @@ SERVO = 5.0
 
 
 def checked(arguments: ControllerArguments) -> ControllerArguments:
-    """The same arguments; `InputError` for wrong kinds and combinations."""
+    """Check the arguments and return them; `InputError` for wrong kinds and combinations."""
     kinds = {"objective": Objective, "retreat": Retreat, "limits": Limits, "collisions": Collisions}
     optional = {name: kind for name, kind in kinds.items() if getattr(arguments, name) is not None}
     steering = {} if isinstance(arguments.steering, bool) else {"steering": Steering}
@@ -82,7 +82,7 @@ def checked(arguments: ControllerArguments) -> ControllerArguments:
 
 
 class ControllerLayout(NamedTuple):
-    """What a controller computes with.
+    """A controller's records in memory, and the objects that they were laid out from.
 
     program : the functions, in memory; step : what a step reads and writes besides them, as views
     dimensions, state : of the resolver's problem, and what the resolver remembers
@@ -101,7 +101,7 @@ class ControllerLayout(NamedTuple):
 
 
 def lay_out(arguments: ControllerArguments, steered: Steered | None) -> ControllerLayout:
-    """The memory of a `Controller`; `InputError` for what the robot lacks, or for too many rows."""
+    """Lay out the memory of a `Controller`; `InputError` for what the robot lacks, or for too many rows."""
     robot, task, resolver, objective, added_task, limits, *_ = arguments
     collisions = arguments.collisions
     limited = limits is not None or collisions is not None
@@ -198,7 +198,7 @@ def lay_out(arguments: ControllerArguments, steered: Steered | None) -> Controll
 
 
 def _own_limits(limits_on: LimitsOn, program: Program) -> list[LaidOutLimit]:
-    """The limits with a kernel of their own; their rows come after those of wheels and functions."""
+    """Lay out the limits with a kernel of their own; their rows come after those of wheels and functions."""
     laid = []
     first = quantity = limits_on.first_own
     for stage, count in zip(limits_on.stages, limits_on.counts, strict=True):
@@ -240,7 +240,7 @@ def _second(
 
 
 def _first() -> SecondOrder:
-    """What takes the place of a record of second order at first order: nothing."""
+    """An empty record of second order, for controllers of first order."""
     shapes = [(0, 3, 4), (0, 6, 0), (0, 6, 0, 0), (0, 0), (0, 0, 0), (0,), (0,), (0, 0)]
     none, cell = np.zeros(0), np.array(1.0)
     integers = np.zeros(0, dtype=np.int64)

@@ -84,7 +84,7 @@ def falls(change: float, slope: float, ahead: float, rounding: float) -> bool:
 
 @compiled
 def shorter(change: float, slope: float) -> float:
-    """The next α's share of this one: the minimum of the parabola through what is known."""
+    """The next trial's share of this α: the minimum of the parabola through the known values and slope."""
     least = -0.5 * slope / (change - slope) if math.isfinite(change) else LEAST
     return min(max(least, LEAST), MOST)
 

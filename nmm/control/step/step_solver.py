@@ -173,7 +173,7 @@ class StepSolver:
         self._plain_call = prepare, step, integers, floats
 
     def _beside_by_python(self, prepare: Callable[[float, Array], None]) -> Callable[[float, Array], float]:
-        """`accelerate` with users' Python functions, which are called at each of its three places."""
+        """Return `accelerate` with users' Python functions, which are called at each of its three places."""
         beside, blocks = self.step_memory.second.beside, self.blocks
 
         def solve(t: float, q: Array) -> float:
@@ -188,7 +188,7 @@ class StepSolver:
         return solve
 
     def _finished(self, q: Array) -> float:
-        """The status after the resolver's Python part, if any, and what a step does with its inputs."""
+        """Run the resolver's Python part, if any, and what a step does after it; return the status."""
         answer = self.step_memory.answer
         if not self._whole:
             self.resolver.finish(self.step_memory.problem, self.dimensions, answer)
@@ -198,7 +198,7 @@ class StepSolver:
         return float(answer.status[()])
 
     def _measured(self, safety_filter: SafetyFilter) -> Callable[[float, Array], None]:
-        """`prepare` of the program, and distances at samples."""
+        """Return the program's `prepare`, followed at samples by the measurement of distances."""
         prepare, mode = self.program.prepare, self.step_memory.limits.mode
 
         def prepared(t: float, q: Array) -> None:
@@ -209,7 +209,7 @@ class StepSolver:
         return prepared
 
     def _again(self) -> Callable[[Array], float]:
-        """again(q) -> status: solves the equations in memory once more."""
+        """Return again(q) -> status, which solves the equations in memory once more."""
         once, blocks = checked_by_caller(resolve, ANSWER), self.blocks
 
         def again(q: Array) -> float:
@@ -225,7 +225,7 @@ class StepSolver:
         return again
 
     def take_sample(self, t: float, q: Array) -> None:
-        """A call that lasts dt: the resolver's inputs, or a retreat's where the error stalls."""
+        """Compute the inputs of a sample: the resolver's, or a retreat's where the error stalls."""
         self.expect_dt()
         earlier = None if self.safety_filter is None else self.before.copy()
         status = self.solve_whole(t, q)
@@ -237,8 +237,8 @@ class StepSolver:
             self.safety_filter.certify(t, q, earlier)
 
     def take_nearest(self, t: float, q: Array, wanted: Array) -> None:
-        """A sample whose inputs are those within the limits that are nearest to `wanted` (m,), at order 2
-        those at its end; neither the resolver nor the task, which may have no value, is listened to."""
+        """Compute the inputs of a sample as those within the limits nearest to `wanted` (m,), at order 2 the
+        inputs at its end. They depend on neither the resolver nor the task, which may have no value."""
         self.expect_dt()
         earlier, self._wanted = self.before.copy(), wanted
         try:
@@ -251,7 +251,7 @@ class StepSolver:
             self._wanted = None
 
     def take_stop(self, t: float, q: Array) -> None:
-        """`take_nearest` to rest; beyond a limit the robot stays where it is and does not return."""
+        """Compute the inputs nearest to rest; beyond a limit the robot stays and does not return."""
         returns = (
             self.step_memory.limits.recovery,
             self.step_memory.clearance.recovery,
@@ -267,8 +267,8 @@ class StepSolver:
                 number[()] = value
 
     def _replace_by(self, wanted: Array, *, stage: bool = False) -> None:
-        """Inputs within the limits nearest to `wanted` (m,), at order 2 those at the sample's end, in place
-        of the resolver's."""
+        """Replace the resolver's inputs by those within the limits nearest to `wanted` (m,), at order 2 the
+        inputs at the sample's end."""
         if self.second:  # it follows its answer by this share within a sample
             wanted = self.before + (wanted - self.before) / self.step_memory.second.share
         self._replace_inputs(wanted, *self.blocks)
@@ -287,7 +287,7 @@ class StepSolver:
         return replaces
 
     def solve_whole(self, t: float, q: Array) -> float:
-        """A sample's inputs without a retreat, with α chosen; returns the status."""
+        """Compute a sample's inputs, without a retreat, and α; return the status."""
         if self.step_size is None:
             return self.solve(t, q)
         self.step_size.share = 1.0
@@ -296,7 +296,7 @@ class StepSolver:
         return float(self.step_memory.answer.status[()])
 
     def solve_stage(self, t: float, q: Array) -> None:
-        """A stage after a sample, whose bounds, step size and retreat hold."""
+        """Compute the inputs of a stage after a sample, whose bounds, step size and retreat hold."""
         mode = self.step_memory.limits.mode
         usual = int(mode)
         mode[()] = STAGE if usual == SAMPLE else usual
@@ -312,7 +312,7 @@ class StepSolver:
             self.program.stands[()] = 0
 
     def at_stage(self, t: float, q: Array) -> None:
-        """The inputs at (t, q), with what the last sample decided; raises as a call does."""
+        """Compute the inputs at (t, q) with what the last sample decided; raises as a call does."""
         if self.samples:
             self.solve_stage(t, q)
         elif self.solve(t, q) >= FAILED:
@@ -325,7 +325,7 @@ class StepSolver:
             return self.step_memory.answer.u.copy()
 
     def count_from(self, held: Array) -> None:
-        """Accelerations count from the inputs (m,) that are held after the sample."""
+        """Count accelerations from the inputs (m,) that are held after the sample."""
         if self.step_memory.limits.mode == SAMPLE:
             self.before[:] = held
 
@@ -333,14 +333,14 @@ class StepSolver:
         return retreat_state.inputs(q, self.program.buffers.G, self.step_memory.problem)
 
     def begin_run(self) -> None:
-        """A run begins: nothing is remembered, and numbers that runs replace are the first ones."""
+        """Begin a run: forget all samples, and restore the first values of numbers that runs replace."""
         self.sample.reset()
         for renewal in self.program.renewals:
             renewal.begin()
 
     @property
     def blocks(self) -> Blocks:
-        """Its memory, for compiled code."""
+        """The memory of functions and step, for compiled code."""
         return self.program.blocks
 
     @property

@@ -67,7 +67,7 @@ class Position(PartsOfPose):
 
 
 def as_point(value: Function | str | ArrayLike, name: str) -> Function:
-    """A point of space: a function with 3 rows as it is, a frame's origin by its name, three numbers, m."""
+    """The function of a point: one with 3 rows as it is, a frame's origin by name, three numbers (m)."""
     if isinstance(value, Function):
         return value
     if isinstance(value, str):
