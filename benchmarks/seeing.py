@@ -115,7 +115,7 @@ class WorldPoint:
     def __init__(self, depth: float, noise: float) -> None:
         self.depth, self.noise, self.p = depth, noise, None
 
-    def look(self, t: float, x: float, y: float, R: Array, c: Array) -> Array:
+    def update(self, t: float, x: float, y: float, R: Array, c: Array) -> Array:
         ray = R @ [x, y, 1.0]
         if self.p is None:
             along = np.outer(ray, ray) / (ray @ ray)
@@ -140,7 +140,7 @@ class Observer:
     def __init__(self, depth: float, noise: float, k1: float = 10.0, k2: float = 60.0) -> None:
         self.k1, self.k2, self.z, self.depth = k1, k2, None, depth
 
-    def look(self, t: float, x: float, y: float, R: Array, c: Array) -> Array:
+    def update(self, t: float, x: float, y: float, R: Array, c: Array) -> Array:
         if self.z is None:
             self.z = np.array([x, y, 1.0 / self.depth])
         else:
@@ -176,7 +176,7 @@ def depth() -> None:
                     for k in range(300):
                         c = np.array(v) * k / 30.0
                         seen = (point - c)[:2] / (point - c)[2] + 1e-3 * rng.standard_normal(2)
-                        found = estimate.look(k / 30.0, *seen, np.eye(3), c)
+                        found = estimate.update(k / 30.0, *seen, np.eye(3), c)
                     off.append(abs((found - c)[2] / (point - c)[2] - 1.0))
                 row.append(f"{100 * np.mean(off):.2f} % (at most {100 * np.max(off):.2f})")
             print(f"  {motion:8} from 0.5: {row[0]}, from 1.5: {row[1]}")

@@ -66,7 +66,7 @@ def estimated(moves: np.ndarray, guess: float, noise: float, rng: np.random.Gene
     for k, c in enumerate(moves):
         x, y, Z = point - c
         seen = np.array([x, y]) / Z + noise * rng.standard_normal(2)
-        found.append((estimate.look(0.03 * k, *seen, np.eye(3), c) - c)[2] / Z)
+        found.append((estimate.update(0.03 * k, *seen, np.eye(3), c) - c)[2] / Z)
     depth, deviation = estimate.depth
     assert noise == 0.0 or abs(depth - 2.0) < 4.0 * deviation  # it knows how much it knows
     return np.array(found)
@@ -263,16 +263,16 @@ def test_the_velocity_of_a_point_that_moves_is_estimated_as_the_steady_kalman_fi
     h, noise, acceleration = 0.05, 0.01, 0.7
     v, found = np.array([0.3, -0.2, 0.1]), MotionEstimate(acceleration)
     for k in range(200):
-        p, rate = found.look(k * h, v * k * h, noise)
+        p, rate = found.update(k * h, v * k * h, noise)
     np.testing.assert_allclose(np.concatenate([p, rate]), np.concatenate([v * k * h, v]), atol=1e-9)
     F, w = np.array([[1.0, h], [0.0, 1.0]]), np.array([[0.5 * h * h], [h]])
     spread = solve_discrete_are(F.T, np.array([[1.0], [0.0]]), acceleration**2 * w @ w.T, [[noise**2]])
     gain = spread[:, 0] / (spread[0, 0] + noise**2)
     off = rng.normal(size=3)
     before = np.array([p + rate * h, rate])
-    p, rate = found.look(200 * h, before[0] + off, noise)
+    p, rate = found.update(200 * h, before[0] + off, noise)
     np.testing.assert_allclose([p, rate], before + np.outer(gain, off), rtol=1e-6)
-    again = found.look(200 * h, before[0] + 9.0, noise)  # the same picture twice, or an older one
+    again = found.update(200 * h, before[0] + 9.0, noise)  # the same picture twice, or an older one
     np.testing.assert_array_equal(again, [p, rate])
 
 

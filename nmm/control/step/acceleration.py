@@ -42,11 +42,11 @@ from nmm.control.step.limit_rows import write_rates_beside, write_rows
 #: A row whose second difference is beyond this share of 1 + its size jumps.
 JUMPED = 1e-4
 #: Rows of `SecondOrder.y`.
-BEHIND, HERE, AHEAD = 0, 1, 2
+BEHIND, MIDDLE, AHEAD = 0, 1, 2
 
 
 @compiled
-def look_beside(t: float, q: Array, side: int, integers: Integers, floats: Array) -> None:
+def evaluate_beside(t: float, q: Array, side: int, integers: Integers, floats: Array) -> None:
     """Write y behind or ahead, at t and `beside`, a step h along the motion from q."""
     laid = views(LaidOut, integers, floats, 0)
     e = views(ControlStep, integers, floats, BESIDE)
@@ -77,7 +77,7 @@ def look_beside(t: float, q: Array, side: int, integers: Integers, floats: Array
 
 
 @compiled
-def go_beside(q: Array, side: int, integers: Integers, floats: Array) -> float:
+def move_beside(q: Array, side: int, integers: Integers, floats: Array) -> float:
     """Write `beside`, a step h along the motion from q, and return how much later that is."""
     e = views(ControlStep, integers, floats, BESIDE)
     h = float(e.second.h[()]) if side == AHEAD else -float(e.second.h[()])
@@ -87,22 +87,22 @@ def go_beside(q: Array, side: int, integers: Integers, floats: Array) -> float:
 
 
 @compiled
-def look_here(t: float, q: Array, integers: Integers, floats: Array) -> None:
-    """The equations at (t, q), y there, and the motion S u."""
+def evaluate_sample(t: float, q: Array, integers: Integers, floats: Array) -> None:
+    """Write the equations and y at (t, q), and the motion S u."""
     write_problem(t, q, integers, floats)
     b = views(LaidOut, integers, floats, 0).buffers
     e = views(ControlStep, integers, floats, BESIDE)
     own, problem, s = e.second, e.problem, e.task.r.shape[0]
     drive(problem.before, b.G, e.arm, e.q_dot)
     for i in range(s):
-        own.y[HERE, i] = problem.rate[i] - dot(problem.J[i], problem.before)
+        own.y[MIDDLE, i] = problem.rate[i] - dot(problem.J[i], problem.before)
     for i in range(own.added.r.shape[0]):
-        own.y[HERE, s + i] = problem.added_rate[i] - dot(problem.added_J[i], problem.before)
+        own.y[MIDDLE, s + i] = problem.added_rate[i] - dot(problem.added_J[i], problem.before)
 
 
 @compiled
 def differentiate(integers: Integers, floats: Array) -> None:
-    """D from y. Where the rate jumps between behind and ahead, that of the side without the jump."""
+    """Write D from y; where the rate jumps between behind and ahead, from the side without the jump."""
     e = views(ControlStep, integers, floats, BESIDE)
     own = e.second
     with_middle = own.task.r.shape[0] + own.added.r.shape[0]
@@ -110,7 +110,7 @@ def differentiate(integers: Integers, floats: Array) -> None:
         behind, ahead = own.y[BEHIND, i], own.y[AHEAD, i]
         own.D[i] = (ahead - behind) / (2.0 * own.h[()])
         if i < with_middle:
-            middle = own.y[HERE, i]
+            middle = own.y[MIDDLE, i]
             if abs(ahead - 2.0 * middle + behind) > JUMPED * (1.0 + abs(middle)):
                 gone = middle - behind if abs(middle - behind) < abs(ahead - middle) else ahead - middle
                 own.D[i] = gone / own.h[()]
@@ -155,15 +155,15 @@ def follow_answer(integers: Integers, floats: Array) -> float:
 @kernel(STEP)
 def accelerate(t: float, q: Array, integers: Integers, floats: Array) -> float:
     """One control step of second order, of the inputs in `before`; returns the status."""
-    look_here(t, q, integers, floats)
+    evaluate_sample(t, q, integers, floats)
     for side in (BEHIND, AHEAD):
-        look_beside(t + go_beside(q, side, integers, floats), q, side, integers, floats)
+        evaluate_beside(t + move_beside(q, side, integers, floats), q, side, integers, floats)
     return answer_led(q, integers, floats)
 
 
 @kernel(BOUNDS)
 def write_next_limits(q: Array, integers: Integers, floats: Array) -> None:
-    """Bounds and rows for the resolver's answer, so that the inputs at the end of the sample keep theirs."""
+    """Write bounds and rows for the resolver's answer, so that the inputs at the sample's end keep theirs."""
     b = views(LaidOut, integers, floats, 0).buffers
     e = views(ControlStep, integers, floats, BESIDE)
     limits, problem, own = e.limits, e.problem, e.second

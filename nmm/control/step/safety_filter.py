@@ -78,7 +78,8 @@ class SafetyFilter:
         """Whether it checked the last sample's motion, which is then made with constant inputs."""
         return bool(self._keep.held)
 
-    def look(self, t: float, q: Array) -> None:
+    def measure_distances(self, t: float, q: Array) -> None:
+        """Measure the distances at a sample at (t, q); no row has to keep another rate than its own yet."""
         self._keep.least.fill(-np.inf)
         self._queries.update(t, q, *self._program.blocks, BESIDE)
 

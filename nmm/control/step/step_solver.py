@@ -32,10 +32,10 @@ from nmm.control.step.acceleration import (
     BEHIND,
     accelerate,
     answer_led,
+    evaluate_beside,
+    evaluate_sample,
     follow_answer,
-    go_beside,
-    look_beside,
-    look_here,
+    move_beside,
 )
 from nmm.control.step.equations import (
     ANSWER,
@@ -178,11 +178,11 @@ class StepSolver:
 
         def solve(t: float, q: Array) -> float:
             prepare(t, q)
-            look_here(t, q, *blocks)
+            evaluate_sample(t, q, *blocks)
             for side in (BEHIND, AHEAD):
-                t_side = t + go_beside(q, side, *blocks)
+                t_side = t + move_beside(q, side, *blocks)
                 prepare(t_side, beside.copy())
-                look_beside(t_side, q, side, *blocks)
+                evaluate_beside(t_side, q, side, *blocks)
             return float(answer_led(q, *blocks))
 
         return solve
@@ -204,7 +204,7 @@ class StepSolver:
         def prepared(t: float, q: Array) -> None:
             prepare(t, q)
             if mode == SAMPLE:
-                safety_filter.look(t, q)
+                safety_filter.measure_distances(t, q)
 
         return prepared
 

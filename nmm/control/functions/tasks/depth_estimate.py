@@ -37,7 +37,7 @@ class DepthEstimate:
         self._R, self._c, self._t = np.eye(3), np.zeros(3), -math.inf
         self._state, self._spread = np.zeros(3), np.zeros((3, 3))
 
-    def look(self, t: float, x: float, y: float, R: Array, c: Array) -> Array:
+    def update(self, t: float, x: float, y: float, R: Array, c: Array) -> Array:
         """The point (3,) after a picture taken at t, s, from c, m, in axes R, at normalised x and y."""
         if not math.isfinite(self._t):
             self._R, self._c, self._state = R, c, np.array([x, y, 1.0 / self._first])
@@ -83,7 +83,7 @@ class MotionEstimate:
         self._state = np.zeros((2, 3))  # p, v; the axes have one covariance
         self._spread = np.zeros((2, 2))
 
-    def look(self, t: float, point: Array, noise: float) -> tuple[Array, Array]:
+    def update(self, t: float, point: Array, noise: float) -> tuple[Array, Array]:
         """The point (3,), m, and its velocity (3,), m/s, after a picture at t, s, that shows it at `point`,
         m, with a standard deviation of `noise`, m. The first one says nothing of the velocity."""
         if not math.isfinite(self._t):

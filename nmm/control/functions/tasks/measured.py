@@ -139,7 +139,7 @@ class MeasuredPoints(Seen):
         camera = self._placed(self._robot)
         placement = Configuration(self._robot, self._robot.q(q)).placement(camera)
         at = scalar(t, "t")
-        numbers = self._taken.look(at, seen.reshape(-1, 2), placement.rotation, placement.translation, far)
+        numbers = self._taken.update(at, seen.reshape(-1, 2), placement.rotation, placement.translation, far)
         self._numbers = numbers
         for live in self._pictures:
             live.set(numbers)
@@ -185,7 +185,7 @@ class Belief:
         """When the point was seen that has not been seen for longest, s."""
         return float(self._times.min())
 
-    def look(self, t: float, seen: Array, R: Array, c: Array, depth: Array | None = None) -> Array:
+    def update(self, t: float, seen: Array, R: Array, c: Array, depth: Array | None = None) -> Array:
         """The numbers of `signal` after a picture (k, 2) taken at t, s, from c (3,), m, in axes R."""
         fx, fy, cx, cy = self._of.intrinsics
         for k, (x, y) in enumerate((seen - [cx, cy]) / [fx, fy]):
@@ -193,13 +193,13 @@ class Belief:
                 continue
             self._times[k] = t
             if depth is None and self._of.observed:
-                self._points[k] = self._estimates[k].look(t, x, y, R, c)
+                self._points[k] = self._estimates[k].update(t, x, y, R, c)
             else:
                 far = self._of.depth[k] if depth is None else depth[k]
                 self._points[k] = c + far * (R @ np.array([x, y, 1.0]))
                 if self._of.moving:
                     noise = far * max(self._noise, ALMOST_SURE)
-                    self._points[k], self._rates[k] = self._motions[k].look(t, self._points[k], noise)
+                    self._points[k], self._rates[k] = self._motions[k].update(t, self._points[k], noise)
         late = np.where(np.isfinite(self._times), t - self._times, 0.0)  # of points that this one lacks
         points = self._points + self._rates * late[:, np.newaxis]
         return np.concatenate([[float(self._of.moving > 0.0), t], points.ravel(), self._rates.ravel()])
@@ -245,7 +245,7 @@ class Pictures(Renewal):
             self._take(t, q, q if real is None else real)
         while self._waiting and self._waiting[0][0] <= t + SOON:
             _, taken, seen, R, c = self._waiting.popleft()
-            self._of._numbers = self._belief.look(taken, seen, R, c)
+            self._of._numbers = self._belief.update(taken, seen, R, c)
             self.set(self._of._numbers)
             if np.isfinite(self._belief.oldest):
                 self._of._at.set(np.array([self._belief.oldest]))
