@@ -20,6 +20,7 @@ from nmm.model.robots.configuration import Configuration
 from nmm.scenario.collisions import SHAPE_PARTS
 from nmm.scenario.constructors import MadePart, documented, parameters
 from nmm.scenario.functions import FUNCTION_PARTS, REFERENCE_PARTS
+from nmm.scenario.limits import LIMIT_PARTS
 from nmm.scenario.objectives import OBJECTIVE_PARTS
 from nmm.scenario.reference import sections
 from nmm.scenario.resolvers import RESOLVER_PARTS
@@ -197,6 +198,7 @@ REGISTERED: list[tuple[kinds.Kinds, dict[str, type[MadePart]]]] = [
     (kinds.REFERENCES, dict(REFERENCE_PARTS)),
     (kinds.OBJECTIVES, dict(OBJECTIVE_PARTS)),
     (kinds.RESOLVERS, dict(RESOLVER_PARTS)),
+    (kinds.LIMITS, dict(LIMIT_PARTS)),
 ]
 each_list = pytest.mark.parametrize(("listed", "parts"), REGISTERED, ids=lambda it: getattr(it, "what", ""))
 

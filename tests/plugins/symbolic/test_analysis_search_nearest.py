@@ -74,9 +74,9 @@ def test_printed(capsys: pytest.CaptureFixture[str]) -> None:
     )
     out = capsys.readouterr().out
     assert "q2 = 0 or ±π; q3 = 0 or ±π" in out
-    assert "x, y, theta and q1 free" in out
+    assert "x, y, theta, q1" in out
     assert "loses ee.z" in out
-    assert "dimension 4 of 6" in out
+    assert "4 of 6" in out
     assert "of 40 starts" in out
     assert "distance 0.5" in out
     assert "-0.3 rad (-17.19°)" in out
