@@ -224,10 +224,18 @@ def method_for(controllers: Sequence[Controller], method: str, tolerance: float 
 class Plant:
     """What a controller's loop moves: by default the ideal robot, which goes where an integrator says.
 
+    Attributes
+    ----------
     integrator : between two samples; inputs that are held are a disturbed robot's
     disturbed : what it does otherwise than it is told
     longer : makes disturbances of more samples, whose first ones are the same; for `step`
     samples : how many `step` has made
+
+    Examples
+    --------
+    >>> plant = nmm.Disturbances(slip={"v": 0.9}).plant(nmm.load("unicycle_2r"), dt=0.01)
+    >>> isinstance(plant, nmm.extending.Plant), plant.disturbs, plant.misleads
+    (True, True, False)
     """
 
     integrator: Integrator

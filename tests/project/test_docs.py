@@ -388,16 +388,18 @@ def test_the_table_of_rooms_is_the_order_of_the_imports() -> None:
 
 def test_the_example_of_limits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")
-    (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    code, classes = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
     monkeypatch.chdir(tmp_path)
-    found: dict[str, Any] = {}
-    exec(code, found)
+    names: dict[str, Any] = {}
+    exec(code, names)
     assert (tmp_path / "limits.png").exists()
-    assert found["run"].margin.min() >= -1e-9
-    (limits,) = re.findall(r"```yaml\n(.*?)```", text, flags=re.DOTALL)
-    (tmp_path / "limited.yaml").write_text(
-        "robot: unicycle_3r\nq0: {q1: 0.3}\nduration: 1\n"
-        "task: {kind: position, frame: ee, axes: xy, reference: [1, 1]}\nresolver: {kind: pg}\n" + limits,
-        encoding="utf-8",
-    )
-    assert nmm.Scenario.load(tmp_path / "limited.yaml").run().limited
+    assert names["run"].margin.min() >= -1e-9
+    exec(classes, names)
+    robots = "unicycle_3r", "{platform: differential_base, arm: small_arm}"
+    for robot, limits in zip(robots, re.findall(r"```yaml\n(.*?)```", text, flags=re.DOTALL), strict=True):
+        (tmp_path / "limited.yaml").write_text(
+            f"robot: {robot}\nq0: {{}}\nduration: 1\nresolver: {{kind: dls}}\n"
+            f"task: {{kind: position, frame: ee, axes: xy, reference: [1, 1]}}\n{limits}",
+            encoding="utf-8",
+        )
+        assert nmm.Scenario.load(tmp_path / "limited.yaml").run().limited

@@ -104,7 +104,17 @@ INNER = {
 #: simulate hands it; what a Swept read of its folder.
 IN_THE_PLACE = {"Distances", "Recorder", "Definition"}
 #: Types that have a name in `nmm.extending`, for packages above the wall, and no place in the reference.
-ABOVE_THE_WALL = {"Awaited", "RunCamera", "Schedule", "Sight", "Sequence", "Steered", "StepSolver", "Verdict"}
+ABOVE_THE_WALL = {
+    "Awaited",
+    "Plant",
+    "RunCamera",
+    "Schedule",
+    "Sight",
+    "Sequence",
+    "Steered",
+    "StepSolver",
+    "Verdict",
+}
 #: Where a property, a cached one, a class's or a static method has its function.
 WRAPPED = ("fget", "func", "__func__")
 
