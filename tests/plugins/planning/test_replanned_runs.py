@@ -7,7 +7,7 @@ import pytest
 from findings import codes, the
 
 import nmm
-from nmm.motion import disturbed
+from nmm.motion import compiled_loop
 
 LIMITS = nmm.Limits(velocity={"platform": 1.0, "arm": 1.5}, acceleration={"platform": 1.0, "arm": 3.0})
 WALL = nmm.Obstacle(nmm.Box([0.2, 4.0, 2.0]), [3.0, 0.0, 0.5], name="wall")
@@ -94,7 +94,7 @@ def test_slip_is_replanned_in_each_run_of_a_rollout(monkeypatch):
     assert off_the_goal(again["q"][:, -1]).max() < 0.03
     assert "plan" not in again.message[0]
     assert "left its plan" in again.message[1]
-    monkeypatch.setattr(disturbed, "AT_ONCE", 37)
+    monkeypatch.setattr(compiled_loop, "A_CALL", 1e-4)
     shorter = rolled(nmm.replan, 8.0)["q"]
     np.testing.assert_array_equal(shorter, again["q"][:, : shorter.shape[1]])
 
