@@ -203,8 +203,8 @@ ADDED = {
         ' curve=Curve("pivot", "Pivot", 12), numbers=(Number("pivot_min", lambda t, x: x.min()),)),',
     ),
     "control/step/recorded.py": (
-        "    found.objective[k] = e.H[()]",
-        "    found.pivot[k] = e.answer.measure[()]",
+        "    record.objective[k] = e.H[()]",
+        "    record.pivot[k] = e.answer.measure[()]",
     ),
 }
 #: Run with that: by the compiled loop, and by the one in Python.
