@@ -50,7 +50,7 @@ FAULTS = [
     Fault(KERNELS + "velocity_map.py", "who[i + 2] * q[int(who[i + 1])] + who[i + 3]", "who[i + 2] * q[int(who[i + 1])]", "model/test_mimic_joints.py::test_a_chain_of_followers model/test_mimic_joints.py::test_a_follower_of_the_platforms_own_joint_moves_with_it"),
     Fault(KERNELS + "kinematics.py", "c * first + s * second, c * second - s * first", "c * first - s * second, c * second + s * first", KINEMATICS),
     Fault(KERNELS + "kinematics.py", "out[1] = twists[i, 1] + c * x - a * z", "out[1] = twists[i, 1] + c * x + a * z", KINEMATICS),
-    Fault(KERNELS + "kinematics.py", "one, two = (j, k) if d > c else (k, j)", "one, two = (j, k) if d < c else (k, j)", KINEMATICS),
+    Fault(KERNELS + "kinematics.py", "near, far = (j, k) if d > c else (k, j)", "near, far = (j, k) if d < c else (k, j)", KINEMATICS),
     Fault(KERNELS + "kinematics.py", "= v[a] * m / total", "= v[a] * m", KINEMATICS),
     # Rotations
     Fault(KERNELS + "rotations.py", "sine = math.sin(angle) / angle if", "sine = math.sin(angle) if", ROTATIONS),
@@ -85,7 +85,7 @@ FAULTS = [
     Fault("nmm/control/resolvers/reduced_gradient.py", "h[j] = numbers[C + j] * problem.h[j]", "h[j] = problem.h[j]", RESOLVERS),
     Fault("nmm/control/resolvers/extended_jacobian.py", "answer.status[()] = SINGULAR_JE if regular else SINGULAR_J", "answer.status[()] = SINGULAR_J", RESOLVERS),
     Fault(KERNELS + "damping.py", "return law.damping * law.damping * (1.0 - share * share)", "return law.damping * law.damping * (1.0 - share)", DAMPING),
-    Fault(KERNELS + "damping.py", "kept * along)", "along)", DAMPING),
+    Fault(KERNELS + "damping.py", "weight * along)", "along)", DAMPING),
     Fault(KERNELS + "damping.py", "b[i] = less(b[i], A[i], done)", "b[i] = b[i]", f"{DAMPING} control/test_priorities.py"),
     # Platforms
     Fault(PLATFORM_FILES + "unicycle.py", "G_q[0, 0, 2] = -sine", "G_q[0, 0, 2] = sine", PLATFORMS),
@@ -101,7 +101,7 @@ FAULTS = [
     Fault(TASKS + "linear_coordinates.py", "rows.value_q[i, j] = numbers[i * n + j]", "rows.value_q[i, j] = 1.0", DERIVATIVES),
     Fault("nmm/control/functions/references/circle.py", "rate *= share * share * (3.0 - 2.0 * share)", "rate *= share", DERIVATIVES),
     Fault("nmm/control/functions/references/circle.py", "rows.value_t[first] = -radius * rate * math.sin(phase)", "rows.value_t[first] = radius * rate * math.sin(phase)", DERIVATIVES),
-    Fault("nmm/control/functions/objectives/coordinates.py", "slope = 0.25 / (y * y) - 0.25 / (kept * kept)", "slope = 0.25 / (y * y)", DERIVATIVES),
+    Fault("nmm/control/functions/objectives/coordinates.py", "slope = 0.25 / (y * y) - 0.25 / (clamped * clamped)", "slope = 0.25 / (y * y)", DERIVATIVES),
     Fault("nmm/control/step/equations.py", "rate[i] = b.value_t[g] - b.value_t[f]", "rate[i] = b.value_t[g] + b.value_t[f]", "control/test_controller.py control/test_functions.py control/test_stepping.py"),
     Fault("nmm/control/step/equations.py", "error = math.pi - (math.pi - error) % (2.0 * math.pi)", "error = error % (2.0 * math.pi)", "control/test_full_turns.py::test_a_posture_is_reached_the_short_way_or_by_the_turns_that_count control/test_controller.py"),
     # Motion
@@ -114,7 +114,7 @@ FAULTS = [
     Fault(LOADING + "mjcf_numbers.py", "y = unit(y - (x @ y) * x)", "y = unit(y)", "model/test_mjcf_mujoco.py"),
     Fault(LOADING + "joint_kinds.py", "for end in (-upper, -lower)", "for end in (lower, upper)", "model/test_axes_down.py"),
     Fault(LOADING + "extents.py", ".max(axis=0).min()", ".max(axis=0).max()", "model/test_mesh_wheels.py model/test_wheels.py"),
-    Fault(LOADING + "packages.py", "found = self._of_mujoco(name) or self._nearby", "found = self._nearby", "model/test_meshes.py model/test_found_nearby.py"),
+    Fault(LOADING + "packages.py", "file = self._of_mujoco(name) or self._nearby", "file = self._nearby", "model/test_meshes.py model/test_found_nearby.py"),
     Fault("nmm/plugins/robot/odometry.py", "added = noise * (self._spread * np.abs(by)) @ noise.T", "added = noise * self._spread @ noise.T", "model/test_odometry.py"),
     Fault("nmm/plugins/robot/odometry.py", "carried[:2, 2] = -step[1], step[0]", "carried[:2, 2] = step[1], step[0]", "model/test_odometry.py"),
 ]  # fmt: skip
