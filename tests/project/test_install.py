@@ -51,6 +51,7 @@ def test_a_loop_imports_what_a_robot_has(pytestconfig: pytest.Config, tmp_path: 
     told = subprocess.run([sys.executable, "-c", LOOP], **given).stdout.split()  # type: ignore[call-overload]
     owners = packages_distributions()
     used = {canonicalize_name(one) for name in told for one in owners.get(name, ())} - {"nmm"}
-    assert {"numpy", "numba", "xacro"} < used
+    assert {"numpy", "llvmlite", "xacro"} < used
+    used.add("numba")  # imported where something is compiled, as at the first start
     # numba imports SciPy, and Python at its start setuptools, where they are installed.
     assert used <= robot.keys() | {"scipy", "setuptools"}
