@@ -107,7 +107,7 @@ class _Door:
             return builder.icmp_signed("!=", self.call(_INT, "PyObject_IsTrue", value), _INT(0))
         if isinstance(kind, types.Integer):
             return context.cast(builder, self.call(_LONG, "PyLong_AsLongLong", value), types.int64, kind)
-        raise NotImplementedError(f"{kind} from Python")
+        raise NotImplementedError(f"{kind} from Python")  # `_known_to_python` has refused it before
 
     def python(self, kind: Any, value: Any) -> Any:
         """A new Python object of a value."""
@@ -129,4 +129,4 @@ class _Door:
             return self.call(_POINTER, "PyBool_FromLong", builder.zext(value, _LONG))
         if isinstance(kind, types.Integer):
             return self.call(_POINTER, "PyLong_FromLongLong", context.cast(builder, value, kind, types.int64))
-        raise NotImplementedError(f"{kind} to Python")
+        raise NotImplementedError(f"{kind} to Python")  # likewise

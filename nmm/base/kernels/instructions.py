@@ -67,7 +67,7 @@ class _Instructions(CodeLibrary):
         return str(self.module)
 
     def get_asm_str(self) -> str:
-        raise NotImplementedError
+        raise NotImplementedError  # there is no machine code yet; numba asks for it to print it only
 
 
 class _Flags(Flags):

@@ -57,7 +57,7 @@ def into_callers(key: Any, function: Plain, inlined: bool = False) -> None:
             values = [*values, context.get_constant(kind, value)]
         return instructions.call(context, builder, made, values)
 
-    type_of.__signature__ = inspect.signature(function)  # type: ignore[attr-defined]
+    type_of.__signature__ = inspect.signature(function)  # type: ignore[attr-defined]  # numba reads it
     generated_in_callers(key, type_of, generate, (types.VarArg(types.Any),))
 
 
@@ -151,7 +151,7 @@ def _generated_for(function: Any, signature: Any, generate: Any) -> None:
 
     names = ("address", *(f"argument_{k}" for k in range(len(signature.args))))
     positional = inspect.Parameter.POSITIONAL_OR_KEYWORD
-    type_of.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+    type_of.__signature__ = inspect.Signature(  # type: ignore[attr-defined]  # likewise
         [inspect.Parameter(name, positional) for name in names]
     )
     generated_in_callers(function, type_of, generate, (types.VarArg(types.Any),))
@@ -170,7 +170,7 @@ def passing_on(signature: Signature, address: int) -> Plain:
     known = to_numba(signature)
 
     def call(address: int, *arguments: Any) -> Any:
-        raise NotImplementedError
+        raise NotImplementedError  # for compiled code alone, which `generate` writes
 
     def generate(context: Any, builder: Any, _: Any, values: Any) -> Any:
         return _call_by_c(context, builder, known, values[0], values[1:])
@@ -179,4 +179,4 @@ def passing_on(signature: Signature, address: int) -> Plain:
     names = ", ".join(f"argument_{k}" for k in range(len(signature.args)))
     scope = {"call": call, "address": address}
     exec(f"def passing_on({names}):\n    return call(address, {names})", scope)
-    return scope["passing_on"]  # type: ignore[return-value]
+    return scope["passing_on"]  # type: ignore[return-value]  # a function, defined in the line above
