@@ -14,6 +14,7 @@ from nmm.base.progress import between
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.plant import Plant
+from nmm.control.sequencing.sequence import Schedule
 from nmm.control.standing_pose import standing_pose
 from nmm.control.step.idle_inputs import idle_inputs
 from nmm.model.robots.loading.ground import slip_warnings
@@ -63,6 +64,7 @@ def record_run(
 
 def run_legs(
     controller: Controller,
+    schedule: Schedule,
     plant: Plant,
     times: Array,
     q: Array,
@@ -73,8 +75,6 @@ def run_legs(
     """The run of tasks that come and go, a leg for each set of active tasks from event to event; an event's
     sample is the next leg's."""
     legs: list[Leg] = []
-    schedule = controller.schedule
-    assert schedule is not None
     controller.reset()
     plant.begin(q)
     schedule.changes(float(times[0]), plant.seen(0, q))

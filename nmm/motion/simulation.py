@@ -105,7 +105,7 @@ def simulate(
     check_disturbed(disturbed, method)
     plant, schedule = Plant(advance, disturbed), controller.schedule
     if schedule is not None:
-        legs = run_legs(controller, plant, times, q, progress, until, watch)
+        legs = run_legs(controller, schedule, plant, times, q, progress, until, watch)
         run, distances = join(controller, schedule, legs, dt, method)
         verdict = lazy_call("nmm.motion.diagnosis.diagnose:diagnose_legs")(
             controller, schedule, legs, run, distances, until

@@ -13,8 +13,9 @@ from places import UR5
 
 import nmm
 from nmm.base.arrays import Array
+from nmm.base.convex_hull import convex_corners
 from nmm.cli.torques import torques
-from nmm.model.dynamics.support import Support, hull
+from nmm.model.dynamics.support import Support
 from nmm.model.dynamics.torques import accelerations, torques_along
 from nmm.motion.table import summary_rows
 from nmm.views.playback.channels import channels, events
@@ -227,7 +228,7 @@ def test_the_margin_is_the_distance_to_the_nearest_edge() -> None:
     support = Support(robot)
     q = robot.q({"x": 1.0, "y": -2.0, "theta": 0.7})
     wheels = support.points(q)
-    corners = wheels[hull(wheels)]
+    corners = wheels[convex_corners(wheels)]
     middle = corners.mean(axis=0)
     for x, y in ((0.0, 0.0), (0.05, 0.02), (5.0, 0.0)):
         point = middle + np.array([x, y])
@@ -241,8 +242,8 @@ def test_the_margin_is_the_distance_to_the_nearest_edge() -> None:
 
 def test_a_hull_has_the_outer_points_alone() -> None:
     square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 0.5], [0.5, 0.0]])
-    assert sorted(hull(square)) == [0, 1, 2, 3]
-    area = square[hull(square)]
+    assert sorted(convex_corners(square)) == [0, 1, 2, 3]
+    area = square[convex_corners(square)]
     ends = np.roll(area, -1, axis=0)
     assert 0.5 * np.sum(area[:, 0] * ends[:, 1] - area[:, 1] * ends[:, 0]) == pytest.approx(1.0)
 

@@ -19,10 +19,12 @@ from typing import Any
 import numpy as np
 
 from nmm.base.arrays import Array, scalar
+from nmm.base.convex_hull import convex_corners
 from nmm.base.errors import InputError
 from nmm.base.kernels.compiled import clear, compiled, kernel, scratch
 from nmm.base.kernels.linear_algebra import dot
 from nmm.base.kernels.records import Frames
+from nmm.base.kernels.rotations import compose3, cross3
 from nmm.base.kernels.velocity_map import to_coordinates
 from nmm.control.limits.limit import (
     LIMIT_ROWS,
@@ -35,7 +37,7 @@ from nmm.control.limits.limit import (
     by_inputs,
     checked_priority,
 )
-from nmm.model.dynamics.support import Support, hull
+from nmm.model.dynamics.support import Support
 from nmm.model.robots.robot import Robot
 
 #: Numbers before those of bodies: gravity, height of the ground over the main body, margin, bodies, corners.
@@ -47,14 +49,6 @@ STILL = 1e-3
 
 
 @compiled
-def cross(a: Array, b: Array, out: Array) -> None:
-    x = a[1] * b[2] - a[2] * b[1]
-    y = a[2] * b[0] - a[0] * b[2]
-    out[2] = a[0] * b[1] - a[1] * b[0]
-    out[0], out[1] = x, y
-
-
-@compiled
 def turned_inertia(R: Array, numbers: Array, first: int, out: Array) -> None:
     """out (3, 3) = R I Rᵀ, I from its six numbers."""
     own, half = scratch((3, 3)), scratch((3, 3))
@@ -63,9 +57,7 @@ def turned_inertia(R: Array, numbers: Array, first: int, out: Array) -> None:
         for j in range(i + 1):
             own[i, j] = own[j, i] = numbers[k]
             k += 1
-    for i in range(3):
-        for j in range(3):
-            half[i, j] = R[i, 0] * own[0, j] + R[i, 1] * own[1, j] + R[i, 2] * own[2, j]
+    compose3(R, own, half)
     for i in range(3):
         for j in range(3):
             out[i, j] = half[i, 0] * R[j, 0] + half[i, 1] * R[j, 1] + half[i, 2] * R[j, 2]
@@ -109,7 +101,7 @@ def ground_force(
         for k in range(n):
             for i in range(3):
                 w[k, i] = frames.jacobians[frame, 3 + i, k]
-            cross(w[k], arm, part)
+            cross3(w[k], arm, part)
             for i in range(3):
                 J[k, i] = frames.jacobians[frame, i, k] + part[i]
                 centre[i, k] += mass * J[k, i]
@@ -120,22 +112,22 @@ def ground_force(
         clear(before)
         for k in range(n):
             # by q_dot_k: twice ω_before x J + w x (what this joint and those after it move)
-            cross(before, J[k], a)
-            cross(w[k], ahead, b)
+            cross3(before, J[k], a)
+            cross3(w[k], ahead, b)
             for i in range(3):
                 part[i] = 2.0 * mass * (a[i] + b[i])
-            cross(before, w[k], a)
+            cross3(before, w[k], a)
             for i in range(3):
                 alpha[i] = omega[i] - before[i] - w[k, i] * q_dot[k]
-            cross(w[k], alpha, b)
+            cross3(w[k], alpha, b)
             for i in range(3):
                 alpha[i] = a[i] + b[i]
             for i in range(3):
                 couple[i] = dot(inertia[i], alpha)
-            cross(w[k], spin, a)
+            cross3(w[k], spin, a)
             for i in range(3):
                 alpha[i] = dot(inertia[i], w[k])
-            cross(omega, alpha, b)
+            cross3(omega, alpha, b)
             for i in range(3):
                 couple[i] += a[i] + b[i]
             add_moment(lever, part, couple, k, by_v)
@@ -356,7 +348,7 @@ def _polygon(robot: Robot) -> tuple[Array, float]:
                 where="tip over",
                 expected="wheels that are one polygon",
             )
-    return points[hull(points)], support.height
+    return points[convex_corners(points, least=1e-12)], support.height
 
 
 def _inner_radius(corners: Array) -> float:

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from nmm.base.arrays import Array
+from nmm.base.convex_hull import convex_corners
 from nmm.model.robots.loading.ground import Ground
 from nmm.model.robots.robot import Robot
 
@@ -69,7 +70,7 @@ class Support:
     def _inside(self, q: Array, points: Array) -> tuple[Array, list[tuple[str, str]]]:
         """Of points (N, 2) at one q (n,)."""
         wheels = self.points(q)
-        corners = hull(wheels)
+        corners = convex_corners(wheels, least=1e-12)
         begins = wheels[corners]
         along = np.roll(begins, -1, axis=0) - begins
         off = points[:, np.newaxis] - begins
@@ -84,21 +85,3 @@ def _main_mass(robot: Robot) -> float:
     """The mass of the body that the platform moves, without its wheels, kg."""
     model = robot.display_model
     return float(model.inertias[model.getJointId(robot.q_names[2])].mass)
-
-
-def hull(points: Array) -> list[int]:
-    """Which of points (K, 2) are the corners of their convex hull, counterclockwise (A. M. Andrew, 1979)."""
-    order = np.lexsort(points.T[::-1])
-    corners: list[int] = []
-    for way in (order, order[::-1]):
-        begin = len(corners)
-        for k in way:
-            while len(corners) - begin >= 2:
-                a, b = points[corners[-2]], points[corners[-1]]
-                left = (b[0] - a[0]) * (points[k][1] - a[1]) - (b[1] - a[1]) * (points[k][0] - a[0])
-                if left > 1e-12:
-                    break
-                corners.pop()
-            corners.append(int(k))
-        corners.pop()
-    return corners

@@ -224,7 +224,7 @@ class _Runs:
                 (*why, *recorder.noticed()),
             )
         else:
-            legs = run_legs(controller, plant, self.times, start, None, self.until)
+            legs = run_legs(controller, schedule, plant, self.times, start, None, self.until)
             recorder = legs[-1].recorder
             outcome, why, *_ = legs[-1].ended
             why = (*why, *(finding for leg in legs for finding in leg.recorder.noticed()))

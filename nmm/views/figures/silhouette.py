@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import Collection, LineCollection, PolyCollection
 
 from nmm.base.arrays import Array
+from nmm.base.convex_hull import convex_corners
 from nmm.model.robots.loading.joint_kinds import axis
 from nmm.model.robots.meshes import read_meshes
 from nmm.model.robots.robot import Robot
@@ -303,20 +304,5 @@ def tyre(radius: float, along: Array) -> Array:
 
 
 def hull(points: Array) -> Array:
-    """The convex hull of points (k, 2), counter-clockwise (Andrew's monotone chain)."""
-    ordered = sorted(set(map(tuple, points.tolist())))
-    if len(ordered) < 3:
-        return points
-    chains: list[tuple[float, ...]] = []
-    for sequence in (ordered, ordered[::-1]):
-        chain: list[tuple[float, ...]] = []
-        for point in sequence:
-            x, y = point
-            while len(chain) > 1:
-                (ax, ay), (bx, by) = chain[-2:]
-                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0.0:
-                    break
-                chain.pop()
-            chain.append(point)
-        chains += chain[:-1]
-    return np.array(chains)
+    """The corners of the convex hull of points (k, 2), counterclockwise."""
+    return points[convex_corners(points)]
