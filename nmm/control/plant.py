@@ -253,6 +253,11 @@ class Plant:
         """Whether a controller sees another q than the robot's."""
         return len(self.disturbed.noise) > 0 or len(self.disturbed.believed) > 0
 
+    @property
+    def believed(self) -> Array | None:
+        """What the controller takes q for by odometry, (N, n); None where it is told."""
+        return self.disturbed.believed if len(self.disturbed.believed) else None
+
     def later(self, first: int) -> Plant:
         """The same robot from the sample `first` on."""
         d = self.disturbed

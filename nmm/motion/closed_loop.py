@@ -39,7 +39,7 @@ def drive_loop(
     if isinstance(plant, Integrator):
         plant = Plant(plant)
     recorder.disturbed = plant.disturbs
-    recorder.believed = plant.disturbed.believed if len(plant.disturbed.believed) else None
+    recorder.believed = plant.believed
     if leg is None or leg.earlier == -math.inf:
         plant.begin(q)
     if leg is None:

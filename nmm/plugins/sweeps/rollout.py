@@ -26,6 +26,7 @@ from nmm.control.step.recorded import Recorded
 from nmm.motion.closed_loop import drive_loop
 from nmm.motion.disturbances import Disturbances, Disturbing, check_disturbed
 from nmm.motion.joining import joined_record, room_for
+from nmm.motion.leg import Leg
 from nmm.motion.recorded_run import run_legs, sample_times
 from nmm.motion.recording import Recorder
 from nmm.motion.simulation import MOST_SAMPLES
@@ -216,13 +217,11 @@ class _Runs:
         controller, recorder, advance = self._controller(i)
         plant = Plant(advance, self.disturbing.at(i, len(self.times)))
         start, schedule = self.starts[i].copy(), controller.schedule
+        legs: list[Leg] = []
         if schedule is None:
             outcome, why = drive_loop(controller, plant, recorder, self.times, start, until=self.until)
-            recorded, reached, why = (
-                recorder.found,
-                _at_goal(recorder, self.until),
-                (*why, *recorder.noticed()),
-            )
+            recorded, count, reached = recorder.found, len(recorder), _at_goal(recorder, self.until)
+            why = (*why, *recorder.noticed())
         else:
             legs = run_legs(controller, schedule, plant, self.times, start, None, self.until)
             recorder = legs[-1].recorder
@@ -230,13 +229,9 @@ class _Runs:
             why = (*why, *(finding for leg in legs for finding in leg.recorder.noticed()))
             recorded = joined_record(controller, schedule, legs)
             waits = schedule.sequence.waiting(schedule.settle()) or not any(legs[-1].active)
-            reached = not waits and _at_goal(recorder, self.until)
-        count = len(recorder) if schedule is None else len(recorded.q)
-        believed = plant.disturbed.believed if len(plant.disturbed.believed) else None
-        self.store.put(rooms, row, recorded, believed, count)
-        self._measure(
-            i, recorded, believed, count, [] if schedule is None else [leg.recorder for leg in legs]
-        )
+            count, reached = len(recorded.q), not waits and _at_goal(recorder, self.until)
+        self.store.put(rooms, row, recorded, plant.believed, count)
+        self._measure(i, recorded, plant.believed, count, [leg.recorder for leg in legs])
         self.samples[i] = count
         ended = "ended" if self.until is None else "reached" if reached else "missed"
         self.outcome[i] = ended if outcome is Outcome.COMPLETED else str(outcome)
