@@ -24,12 +24,6 @@ PLANAR = Position("ee", "xy")
 WITH_HEADING = (PLANAR, Heading("link2"))
 
 
-@pytest.fixture(scope="module")
-def fixed_2r() -> Robot:
-    wheels = {"left_wheel_joint": 0.0, "right_wheel_joint": 0.0}
-    return load("unicycle_2r", platform="fixed", lock=wheels)
-
-
 def test_extremes_count_the_singular_places_that_the_grid_misses(robot_2r: Robot) -> None:
     measures = ("sigma_min", "eccentricity", "arm_manipulability", "platform_manipulability", "weighted")
     made = singularity_map((robot_2r, PLANAR), samples=20, measures=measures)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from planar_arms import link_lengths
 from sliding_arm import sliding
 
 from nmm.analysis import analyse
@@ -23,18 +24,6 @@ from nmm.model.robots.robot import Robot
 Array = NDArray[np.float64]
 PLANAR = Position("ee", "xy")
 WITH_HEADING = (PLANAR, Heading("link2"))
-
-
-@pytest.fixture(scope="module")
-def fixed_2r() -> Robot:
-    wheels = {"left_wheel_joint": 0.0, "right_wheel_joint": 0.0}
-    return load("unicycle_2r", platform="fixed", lock=wheels)
-
-
-def link_lengths(robot: Robot) -> tuple[float, float]:
-    here = Configuration(robot, np.zeros(robot.n))
-    points = [np.array(here.placement(name).translation)[:2] for name in ("link1", "link2", "ee")]
-    return float(np.linalg.norm(points[1] - points[0])), float(np.linalg.norm(points[2] - points[1]))
 
 
 def all_points(those: SingularSet) -> Array:

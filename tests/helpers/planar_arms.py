@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 import nmm
 from nmm.model.robots.robot import Robot
 
@@ -29,3 +31,10 @@ def planar_arm(folder: Path, *lengths: float, limited: bool = False) -> Robot:
     path = folder / "planar_arm.urdf"
     path.write_text(f'<robot name="planar_arm">{"".join([*links, *joints])}<link name="ee"/></robot>')
     return nmm.load(path, platform="fixed")
+
+
+def link_lengths(robot: Robot) -> tuple[float, float]:
+    """Of the two links of a planar arm, m."""
+    at_zero = nmm.Configuration(robot, np.zeros(robot.n))
+    points = [np.array(at_zero.placement(name).translation)[:2] for name in ("link1", "link2", "ee")]
+    return float(np.linalg.norm(points[1] - points[0])), float(np.linalg.norm(points[2] - points[1]))
