@@ -111,11 +111,18 @@ def test_a_second_writer_is_told(tmp_path: Path) -> None:
 
 
 def test_a_second_writer_waits_for_the_first(tmp_path: Path) -> None:
-    folder = tmp_path / "o"
-    first = threading.Thread(target=write, args=(folder, 1, 0.05))
+    folder, begun = tmp_path / "o", threading.Event()
+
+    def write_first() -> None:
+        with replaced_folder(folder, ours) as temporary:
+            begun.set()
+            time.sleep(0.4)
+            for name in NAMES:
+                (temporary / name).write_text('{"format": "ours", "number": 1}')
+
+    first = threading.Thread(target=write_first)
     first.start()
-    while not (tmp_path / ".o.nmm-writing" / "lock").exists():
-        time.sleep(0.001)
+    begun.wait()
     write(folder, 2)
     first.join()
     assert numbers(folder) == {'{"format": "ours", "number": 2}'}
