@@ -24,7 +24,7 @@ from planning import DISTANCE, KINDS, LIMITS, SIX, Scene, checked
 
 import nmm
 from nmm.plugins.planning.plan import Asked
-from nmm.plugins.planning.search import Search
+from nmm.plugins.planning.search import PlanSearch
 
 #: What OMPL may take, s.
 SECONDS = 10.0
@@ -59,7 +59,7 @@ def of_ompl(scene: Scene, seed: int) -> nmm.Plan:
 
     robot, start = scene.robot, scene.robot.q(scene.start)
     asked = Asked(nmm.Collisions(DISTANCE, obstacles=scene.obstacles), LIMITS, nmm.Goal())
-    search = Search(robot, start, [scene.goal], asked, seed)
+    search = PlanSearch(robot, start, [scene.goal], asked, seed)
     search.begin(SECONDS, None)
     goals, n_p, ways = search.ends(scene.goal, start), robot.platform.n_p, search.trees.ways
 
@@ -109,7 +109,7 @@ def of_ompl(scene: Scene, seed: int) -> nmm.Plan:
     return search.finished(np.vstack([*legs(search, corners)]))
 
 
-def legs(search: Search, corners: list[np.ndarray]) -> Iterator[np.ndarray]:
+def legs(search: PlanSearch, corners: list[np.ndarray]) -> Iterator[np.ndarray]:
     """The legs through OMPL's states, the arm in proportion to the platform's way, as OMPL has it."""
     n_p = search.robot.platform.n_p
     for a, b in pairwise(corners):

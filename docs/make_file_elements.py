@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from nmm.model.robots.loading.file_elements import READ, SRDF, URDF, How, Part, Table
+from nmm.model.robots.loading.file_elements import READ, SRDF, URDF, ElementRule, How, Table
 from nmm.model.robots.loading.mjcf_parts import ELEMENTS, EVERYWHERE
 
 PAGE = Path(__file__).with_name("file_elements.md")
@@ -15,9 +15,9 @@ TABLES: dict[str, Table] = {
     "URDF": URDF,
     "SRDF": SRDF,
     "MJCF": {
-        "any element": Part(READ, "", {name: How(how) for name, how in EVERYWHERE.items()}),
+        "any element": ElementRule(READ, "", {name: How(how) for name, how in EVERYWHERE.items()}),
         **{
-            path: Part(row.how, row.why, {name: How(how) for name, how in row.attributes.items()})
+            path: ElementRule(row.how, row.why, {name: How(how) for name, how in row.attributes.items()})
             for path, row in ELEMENTS.items()
         },
     },
@@ -50,7 +50,7 @@ def _section(name: str, table: Table) -> Iterator[str]:
     yield ""
 
 
-def _attributes(part: Part) -> Iterator[str]:
+def _attributes(part: ElementRule) -> Iterator[str]:
     groups: dict[How, list[str]] = {}
     for name, how in part.attributes.items():
         groups.setdefault(how, []).append(f"`{name}`")

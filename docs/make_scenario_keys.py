@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from itertools import groupby
 from pathlib import Path
 
-from nmm.scenario.reference import Section, sections
+from nmm.scenario.reference import ReferenceSection, sections
 
 PAGE = Path(__file__).with_name("scenarios.md")
 KIND, ANY = ", kind: ", ", of any kind"
@@ -59,7 +59,7 @@ def page() -> str:
     return "\n".join(parts)
 
 
-def _rows(group: list[Section]) -> Iterator[str]:
+def _rows(group: list[ReferenceSection]) -> Iterator[str]:
     """A part's keys, those of its kinds, and those of its parts, each after a row with its name."""
     told: list[Key] = []
     for where, found in groupby(group, lambda section: section.title.partition(KIND)[0]):
@@ -76,7 +76,7 @@ def _rows(group: list[Section]) -> Iterator[str]:
         told += section.keys
 
 
-def _of_kinds(kinds: list[Section], where: str) -> Iterator[str]:
+def _of_kinds(kinds: list[ReferenceSection], where: str) -> Iterator[str]:
     """Keys that several kinds have; then each kind, what it is, which of these it has, and its own keys."""
     count = Counter((name, text) for section in kinds for name, _, text in section.keys)
     texts: dict[str, str] = {}

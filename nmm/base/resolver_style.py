@@ -23,7 +23,7 @@ _GREEK = {"theta": "θ", "omega": "ω", "phi": "φ", "psi": "ψ", "alpha": "α",
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
-class Look(NamedTuple):
+class RunStyle(NamedTuple):
     """How a run appears among several: its name, its colour, its dashes."""
 
     name: str
@@ -46,7 +46,7 @@ def resolver_styles() -> dict[str, tuple[str, str]]:
     }
 
 
-def looks(resolvers: Sequence[str]) -> list[Look]:
+def looks(resolvers: Sequence[str]) -> list[RunStyle]:
     """The look of each of several runs: its resolver's, unless another run has it already.
 
     Others take a colour that no resolver has, then the rest, with dashes that the colour has not had; no two
@@ -57,16 +57,16 @@ def looks(resolvers: Sequence[str]) -> list[Look]:
     colors = [*spare, *(color for color in OF_RUNS if color not in spare)]
     every = [(color, dashes) for dashes in DASHES for color in colors]
     others = cycle([look for look in every if look not in own.values()] or every)
-    assigned: list[Look] = []
+    assigned: list[RunStyle] = []
     for k, resolver in enumerate(resolvers):
         earlier = resolvers[:k].count(resolver)
         name = resolver.upper() if not earlier else f"{resolver.upper()} ({earlier + 1})"
         color, dashes = own[resolver] if resolver in own and not earlier else next(others)
-        assigned.append(Look(name, color, dashes))
+        assigned.append(RunStyle(name, color, dashes))
     return assigned
 
 
-def looks_of_labels(labels: Sequence[str]) -> list[Look]:
+def looks_of_labels(labels: Sequence[str]) -> list[RunStyle]:
     """The looks of labelled motions, a resolver's where the label names one; repeated labels get a number."""
     labelled = []
     for k, (label, look) in enumerate(zip(labels, looks([label.lower() for label in labels]), strict=True)):

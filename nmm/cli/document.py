@@ -14,7 +14,7 @@ from nmm.cli.output import console, show_table, show_text
 ZERO = 1e-10
 
 
-class Table(NamedTuple):
+class DocumentTable(NamedTuple):
     """Columns in `numeric` are right-aligned; a `wide` table is transposed or split on a narrow terminal."""
 
     columns: Sequence[str]
@@ -24,12 +24,12 @@ class Table(NamedTuple):
 
 
 #: A line; "" is an empty one.
-Item = Table | Finding | str
+Item = DocumentTable | Finding | str
 
 
 def show(items: Iterable[Item]) -> None:
     for item in items:
-        if not isinstance(item, Table):
+        if not isinstance(item, DocumentTable):
             say(str(item))
         elif item.wide:
             _show_wide(item)
@@ -67,7 +67,7 @@ def number(value: float, largest: float = 0.0) -> str:
     return number_text(rounded(value, largest))
 
 
-def _show_wide(table: Table) -> None:
+def _show_wide(table: DocumentTable) -> None:
     """The table, or its transpose where that is narrower and it is too wide; in blocks where both are."""
     lines = [table.columns, *table.rows]
     columns: list[Sequence[str]] = list(zip(*lines, strict=True))

@@ -262,7 +262,7 @@ class Browser:
 
 
 @dataclass(frozen=True)
-class Ellipsoids:
+class EllipsoidGroup:
     ellipsoids: bool = flag(
         "--ellipsoids",
         "Draw the manipulability ellipsoids: how fast the robot, and its arm alone, can move the "

@@ -184,7 +184,7 @@ EXPECTED = (
 
 
 @dataclass(frozen=True)
-class Chosen:
+class ChosenResolver:
     text: str  #: as it was given
     kind: str  #: rg, pg, ...; "own" for a Python file's
     settings: tuple[tuple[str, str], ...] = ()  #: of its own, by key, as text
@@ -208,18 +208,18 @@ class Chosen:
         return scenario.with_resolver(self.kind).with_settings(settings)
 
 
-def chosen(text: str, option: str) -> Chosen:
+def chosen(text: str, option: str) -> ChosenResolver:
     """One resolver; `InputError` for a text that names none, and for a file without it."""
     kind, *rest = split_outside_brackets(text, ":")
     if kind.endswith(".py"):
         expect(len(rest) == 1 and rest[0], option, "FILE.py:NAME", text)
-        return Chosen(f"{kind}:{rest[0]}", "own", own=_from_file(Path(kind), rest[0], option))
+        return ChosenResolver(f"{kind}:{rest[0]}", "own", own=_from_file(Path(kind), rest[0], option))
     settings = []
     for setting in rest:
         key, equals, value = (part.strip() for part in setting.partition("="))
         expect(key and equals and value, option, "KIND:KEY=VALUE, as in pg:alpha=50", text)
         settings.append((key, value))
-    return Chosen(text, kind, tuple(settings))
+    return ChosenResolver(text, kind, tuple(settings))
 
 
 def named(value: str, option: str, expected: str = EXPECTED) -> list[str]:
@@ -232,7 +232,7 @@ def named(value: str, option: str, expected: str = EXPECTED) -> list[str]:
     return texts
 
 
-def check_different(resolvers: Sequence[Chosen], scenarios: Sequence[Scenario], option: str) -> None:
+def check_different(resolvers: Sequence[ChosenResolver], scenarios: Sequence[Scenario], option: str) -> None:
     """`InputError` for two that come to the same settings."""
     settings: list[dict[str, Any]] = [scenario.parts.resolver.explicit() for scenario in scenarios]
     for k, values in enumerate(settings):
@@ -241,7 +241,9 @@ def check_different(resolvers: Sequence[Chosen], scenarios: Sequence[Scenario], 
 
 
 @contextmanager
-def of_several(several: Sequence[Chosen], choice: Chosen, settings: Mapping[str, object]) -> Iterator[None]:
+def of_several(
+    several: Sequence[ChosenResolver], choice: ChosenResolver, settings: Mapping[str, object]
+) -> Iterator[None]:
     """In the block, an error that is about a key of one resolver says it as `--resolvers` takes it."""
     try:
         yield

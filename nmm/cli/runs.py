@@ -17,7 +17,7 @@ from nmm.base.text_format import listed
 from nmm.cli.groups import (
     AddedOptions,
     Browser,
-    Ellipsoids,
+    EllipsoidGroup,
     Figures,
     OfRobot,
     PlaceOfOptions,
@@ -26,7 +26,7 @@ from nmm.cli.groups import (
 from nmm.cli.interrupts import shielded
 from nmm.cli.options import (
     LIMITS,
-    Chosen,
+    ChosenResolver,
     ResolversOption,
     ScenarioArgument,
     SetOption,
@@ -70,7 +70,7 @@ def run(
         "--play", "Show the motion in the browser as it is computed, then play it; Ctrl-C ends it."
     ),
     browser: Browser,
-    ellipsoids: Ellipsoids,
+    ellipsoids: EllipsoidGroup,
     figures: Figures,
 ) -> int:
     """Run a scenario and write what happened.
@@ -156,7 +156,7 @@ def compare(
     out: Annotated[Path | None, out_option("runs/<scenario>-compare")] = None,
     html: Annotated[bool, typer.Option("--html", hidden=True, callback=_always_written)] = False,
     table: TableOption = None,
-    ellipsoids: Ellipsoids,
+    ellipsoids: EllipsoidGroup,
     figures: Figures,
 ) -> int:
     """Run a scenario with several resolvers, or with one at several settings.
@@ -274,7 +274,11 @@ def paper(
 
 
 def _load(
-    name: str, resolver: Chosen | None, settings: Mapping[str, object], limits: bool | None, of_robot: OfRobot
+    name: str,
+    resolver: ChosenResolver | None,
+    settings: Mapping[str, object],
+    limits: bool | None,
+    of_robot: OfRobot,
 ) -> Scenario:
     from nmm.cli.subjects import scenario_with
     from nmm.scenario import Scenario

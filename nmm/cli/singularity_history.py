@@ -16,7 +16,7 @@ from nmm.base.arrays import Array
 from nmm.base.findings import Finding
 from nmm.base.findings.singularities import named_or_counted
 from nmm.base.latex import block, minor_name
-from nmm.cli.document import Item, Table, fields, number, rounded
+from nmm.cli.document import DocumentTable, Item, fields, number, rounded
 from nmm.cli.singularity_report import header, sizes, subject_data, without_twins
 from nmm.motion.trajectory import Trajectory
 
@@ -71,7 +71,7 @@ def history_data(study: Studied, history: SingularityHistory) -> dict[str, Any]:
     }
 
 
-def _parts(study: Studied, history: SingularityHistory) -> Table:
+def _parts(study: Studied, history: SingularityHistory) -> DocumentTable:
     groups = {**study.robot.groups, "robot": study.robot.u_names}
     largest = float(history.singular_values.max())
     rows = []
@@ -80,7 +80,7 @@ def _parts(study: Studied, history: SingularityHistory) -> Table:
         inputs, at = named_or_counted(groups[key], "inputs"), f"{history.t[sigma.argmin()]:g} s"
         rows.append([label, inputs, number(sigma.min(), largest), at, number(sigma.max(), largest)])
     columns = ["part", "inputs", "smallest σ_min", "at", "largest σ_min"]
-    return Table(columns, rows, columns[2:])
+    return DocumentTable(columns, rows, columns[2:])
 
 
 def _verdict(history: SingularityHistory) -> Iterator[Finding]:
@@ -123,7 +123,7 @@ def _partitions(run: Trajectory, history: SingularityHistory) -> Iterator[Item]:
         columns = block([history.inputs[j] for j in used[first]])
         rows.append([begins, ends, f"{share[lowest]:.3g}", at, columns])
     names = ["from", "to", "smallest |det Ja|/√(det J Jᵀ)", "at", "RG's partition"]
-    yield Table(names, rows, names[:4])
+    yield DocumentTable(names, rows, names[:4])
     if len(starts) - 1 > MOST:
         yield Finding("more_partition_changes", {"count": len(starts) - 1 - MOST})
 
@@ -148,7 +148,7 @@ def _crossings(run: Trajectory | None, history: SingularityHistory) -> Iterator[
                 ]
             )
         columns = ["at", "to", "minor that changes its sign", *(["RG uses"] if run is not None else [])]
-        yield Table(columns, rows[:MOST], ["at"])
+        yield DocumentTable(columns, rows[:MOST], ["at"])
         if len(rows) > MOST:
             yield Finding("more_crossings", {"count": len(rows) - MOST})
     else:

@@ -18,7 +18,7 @@ from nmm.base.findings import Finding
 from nmm.base.findings.singularities import named_or_counted
 from nmm.base.latex import Typeset, joined, minor_name, sentence, symbol
 from nmm.base.text_format import measured
-from nmm.cli.document import Item, Table, fields, number, rounded
+from nmm.cli.document import DocumentTable, Item, fields, number, rounded
 from nmm.control.directions import SMALL_PART, direction_text
 from nmm.control.resolvers.reduced_gradient import ReducedGradient
 
@@ -87,7 +87,7 @@ def described(
     largest = float(np.abs(report.J).max())
     cells = [[name, *(number(value, largest) for value in row)]
              for name, row in zip(report.rows, report.J, strict=True)]  # fmt: skip
-    yield Table(["J", *report.inputs], cells, report.inputs, wide=True)
+    yield DocumentTable(["J", *report.inputs], cells, report.inputs, wide=True)
     sizes_of_columns = np.abs(report.J).max(axis=0)
     small = sizes_of_columns <= report.tolerance * largest
     idle = [name for name, zero in zip(report.inputs, small, strict=True) if zero]
@@ -167,7 +167,7 @@ def _directions(vectors: Array, names: Sequence[str]) -> list[str]:
     return [_direction(vector, names) for vector in vectors]
 
 
-def _parts(report: SingularityReport) -> Table:
+def _parts(report: SingularityReport) -> DocumentTable:
     s, largest = len(report.rows), report.singular_values[0]
     rows = []
     for key, label in without_twins([(name, part.inputs) for name, part in report.parts.items()]):
@@ -177,7 +177,7 @@ def _parts(report: SingularityReport) -> Table:
         sizes = number(part.sigma_min, largest), number(part.condition)
         rows.append([label, inputs, f"{part.rank} of {s}", *sizes, lost if len(part.lost) else "-"])
     columns = ["part", "inputs", "rank", "σ_min", "condition", "cannot move"]
-    return Table(columns, rows, ["σ_min", "condition"])
+    return DocumentTable(columns, rows, ["σ_min", "condition"])
 
 
 def _verdict(report: SingularityReport) -> Iterator[Finding]:
@@ -248,7 +248,7 @@ def _minors(report: SingularityReport, idle: list[str], left_out: int) -> Iterat
         ]
         columns = ["value", "|Δ|/√(det J Jᵀ)", "minor"]  # whose names may be long
         if rows:
-            yield Table(columns, rows, columns[:2])
+            yield DocumentTable(columns, rows, columns[:2])
         if folded:
             others = [name for name in folded if not set(name) & set(idle)]
             yield Finding("some_minors_zero", {"inputs": idle, "others": others})

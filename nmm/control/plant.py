@@ -39,7 +39,7 @@ from nmm.model.robots.zero_order_hold import HeldInputs, hold_rates, inputs_of
 from nmm.model.robots.zero_order_hold import Inputs as HeldRecord
 
 
-class Controller(Protocol):
+class PlantController(Protocol):
     """What of `nmm.Controller` a plant needs."""
 
     dt: float | None
@@ -194,12 +194,12 @@ class Guarded(Around):
         return self.held(q, u, dt)
 
 
-def guarded(advance: Integrator, controller: Controller) -> Integrator:
+def guarded(advance: Integrator, controller: PlantController) -> Integrator:
     safety_filter = controller.solver.safety_filter
     return advance if safety_filter is None else Guarded(advance, safety_filter, HeldInputs(controller.robot))
 
 
-def method_for(controllers: Sequence[Controller], method: str, tolerance: float = 1e-9) -> Integrator:
+def method_for(controllers: Sequence[PlantController], method: str, tolerance: float = 1e-9) -> Integrator:
     """The integrator of that name; `InputError` for one that does not go with one of the controllers."""
     chosen = integrator(method, controllers[0].robot, tolerance)
     if method == "adaptive" and any(each.solver.samples for each in controllers):
@@ -275,7 +275,7 @@ class Plant:
         q = d.believed[k] if len(d.believed) else q
         return q + d.noise[k] if len(d.noise) else q
 
-    def under(self, controller: Controller) -> Integrator:
+    def under(self, controller: PlantController) -> Integrator:
         """The ideal robot under a controller: inputs are held near obstacles, and accelerate at order 2."""
         solver = controller.solver
         if solver.second:
@@ -320,7 +320,9 @@ class Plant:
         self.samples += 1
         return np.array(ahead)
 
-    def step(self, controller: Controller, t: float, q: Array, dt: float, method: str) -> tuple[Array, Array]:
+    def step(
+        self, controller: PlantController, t: float, q: Array, dt: float, method: str
+    ) -> tuple[Array, Array]:
         """`Controller.step` of this robot."""
         expect(method == "zoh", "method", "zoh, as a plant's inputs are held", method)
         if not self.disturbs:

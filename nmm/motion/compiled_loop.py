@@ -49,7 +49,7 @@ class Ends(NamedTuple):
     tolerances: Vector
 
 
-class Choice(NamedTuple):
+class StepSizeChoice(NamedTuple):
     """How α is chosen: where the code of `shorten` begins, 0 for a constant α, and the objective's blocks."""
 
     code: int
@@ -59,7 +59,7 @@ class Choice(NamedTuple):
 
 ADVANCE_SAMPLES = int64(
     *(int64[::1], float64[::1], record_type(Tableau), float64[::1], int64),
-    *(int64, int64, record_type(Ends), record_type(Choice), record_type(Disturbed)),
+    *(int64, int64, record_type(Ends), record_type(StepSizeChoice), record_type(Disturbed)),
     record_type(Recorded),
 )
 
@@ -100,7 +100,7 @@ def arrived(error: Array, ends: Ends) -> bool:
 
 
 @compiled
-def whole_alpha(e: ControlStep, choice: Choice) -> float:
+def whole_alpha(e: ControlStep, choice: StepSizeChoice) -> float:
     """Restore the resolver's own α; 1 where α is constant."""
     if choice.code == 0:
         return 1.0
@@ -110,7 +110,7 @@ def whole_alpha(e: ControlStep, choice: Choice) -> float:
 
 
 @compiled
-def alpha(e: ControlStep, choice: Choice) -> float:
+def alpha(e: ControlStep, choice: StepSizeChoice) -> float:
     """The α in use; 1 where it is constant."""
     if choice.code == 0:
         return 1.0
@@ -127,7 +127,7 @@ def advance_samples(
     last: int,
     partitioned: int,
     ends: Ends,
-    choice: Choice,
+    choice: StepSizeChoice,
     disturbed: Disturbed,
     found: Recorded,
 ) -> int:
@@ -208,9 +208,9 @@ class CompiledLoop:
             unit_codes(controller.rows),
             np.array([-1.0, -1.0] if until is None else [until.m, until.rad]),
         )
-        self._choice = Choice(0, np.zeros(0, dtype=np.int64), np.zeros(0))
+        self._choice = StepSizeChoice(0, np.zeros(0, dtype=np.int64), np.zeros(0))
         if controller.solver.step_size is not None:
-            self._choice = Choice(shorten.address, *controller.solver.step_size.blocks)
+            self._choice = StepSizeChoice(shorten.address, *controller.solver.step_size.blocks)
         self._fly = checked_by_caller(advance_samples, ADVANCE_SAMPLES)
         self._at_once = 16
 

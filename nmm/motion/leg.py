@@ -13,7 +13,7 @@ from nmm.motion.recording import Recorder
 from nmm.motion.verdict import FindingLine, Outcome
 
 
-class Ended(NamedTuple):
+class RunEnd(NamedTuple):
     """How a run ended: q (n,) is the last configuration recorded, or the start; J (s, m) the task's matrix in
     the controller's last call, at q or a step from it."""
 
@@ -32,7 +32,7 @@ class Leg:
     active: tuple[bool, ...]
     integrator: Integrator
     recorder: Recorder
-    ended: Ended
+    ended: RunEnd
     end: float
 
 

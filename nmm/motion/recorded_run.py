@@ -20,7 +20,7 @@ from nmm.control.step.idle_inputs import idle_inputs
 from nmm.model.robots.loading.ground import slip_warnings
 from nmm.model.robots.loading.provenance import provenance_of
 from nmm.motion.closed_loop import drive_loop, finding_in
-from nmm.motion.leg import Ended, Leaving, Leg
+from nmm.motion.leg import Leaving, Leg, RunEnd
 from nmm.motion.recording import Recorder
 from nmm.motion.verdict import Outcome
 
@@ -42,7 +42,7 @@ def record_run(
     until: Goal | None = None,
     leg: Leaving | None = None,
     watch: Callable[[Recorder], None] | None = None,
-) -> tuple[Recorder, Ended]:
+) -> tuple[Recorder, RunEnd]:
     """Run over the times (N,) from q; `watch` gets the recorder first."""
     recorder = Recorder(controller, times)
     recorder.at_middle = plant.integrator.at_middle
@@ -59,7 +59,7 @@ def record_run(
     if controller.safety_filter is not None:
         recorder.counts = controller.safety_filter.counts
     last = recorder.q[len(recorder) - 1] if len(recorder) else q
-    return recorder, Ended(outcome, reasons, last, controller.solver.derivatives[0].copy())
+    return recorder, RunEnd(outcome, reasons, last, controller.solver.derivatives[0].copy())
 
 
 def run_legs(

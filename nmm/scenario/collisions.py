@@ -18,12 +18,12 @@ from nmm.model.robots.robot import Robot
 from nmm.scenario.constructors import FunctionPart, MadePart, keys_of
 from nmm.scenario.files import PACKAGE, FileName
 from nmm.scenario.functions import REFERENCE_PARTS
-from nmm.scenario.keys import OneOf, Part, at, each
+from nmm.scenario.keys import KeyedPart, OneOf, at, each
 from nmm.scenario.numbers import Positive
 from nmm.scenario.robot import Three
 
 
-class ShapePart(Part):
+class ShapePart(KeyedPart):
     """A shape, in the axes of its obstacle."""
 
     makes: ClassVar[type[Shape]]
@@ -114,7 +114,7 @@ class Along:
         return self._program.evaluate(t, self._q)[0].value_t
 
 
-class ObstaclePart(Part):
+class ObstaclePart(KeyedPart):
     """A shape that the robot keeps away from; it stands at `xyz`, or moves along a path."""
 
     name: str = Field("", description="for messages; the shape's kind when not given")

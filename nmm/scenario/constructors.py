@@ -37,7 +37,7 @@ from pydantic_core import PydanticUndefined
 from nmm.base.errors import InputError
 from nmm.control.functions.function import Function
 from nmm.model.robots.robot import Robot
-from nmm.scenario.keys import Part, at
+from nmm.scenario.keys import KeyedPart, at
 from nmm.scenario.numbers import Number, NumberList, Whole, nested, number, numbers, numbers_by_name
 
 #: The key of what a constructor takes with a star: `Coordinates(*combinations)` is `of: [...]`.
@@ -160,7 +160,7 @@ FRAMES, COORDINATES = ("frame", "relative_to"), ("of", "joints")
 UNIT = "unit"
 
 
-class MadePart(Part):
+class MadePart(KeyedPart):
     """A part that makes an object of the class `makes`, which checks the values."""
 
     makes: ClassVar[type]
@@ -212,7 +212,7 @@ def _argument(value: Any, *place: str) -> Any:
 
 
 P = TypeVar("P", bound=MadePart)
-Q = TypeVar("Q", bound=Part)
+Q = TypeVar("Q", bound=KeyedPart)
 
 
 def part_of(kind: str, makes: type, base: type[P], **spelled: Any) -> type[P]:

@@ -10,12 +10,12 @@ from pydantic import AfterValidator, BeforeValidator
 
 from nmm.base.errors import InputError
 from nmm.base.files import named_folder
-from nmm.scenario.keys import Part
+from nmm.scenario.keys import KeyedPart
 from nmm.scenario.yaml_text import Place
 
 #: The absolute path of a file that is named at a place of the scenario.
 Absolute = Callable[[str, Place], Path]
-P = TypeVar("P", bound=Part)
+P = TypeVar("P", bound=KeyedPart)
 
 PACKAGE = "package://"
 
@@ -52,7 +52,7 @@ def with_files(part: P, absolute: Absolute, place: Place = ()) -> P:
     """The part at a place of the scenario, with absolute paths in it and in the parts below."""
 
     def whole(value: Any, place: Place) -> Any:
-        if isinstance(value, Part):
+        if isinstance(value, KeyedPart):
             return with_files(value, absolute, place)
         if isinstance(value, list):
             return [whole(item, (*place, i)) for i, item in enumerate(value)]

@@ -20,7 +20,7 @@ from nmm.control.functions.references.orientation import rotation_vector
 from nmm.control.functions.references.polynomial import Constant, Polynomial
 from nmm.control.functions.tasks.camera_faults import CameraFaults
 from nmm.scenario.constructors import FunctionPart, MadePart, Unit, keys_of, part_of
-from nmm.scenario.keys import KeyedError, OneOf, Part, at, is_path, references_of
+from nmm.scenario.keys import KeyedError, KeyedPart, OneOf, at, is_path, references_of
 from nmm.scenario.numbers import NumberList, Numbers, Positive, numbers
 
 
@@ -104,7 +104,7 @@ def _fixed(value: object) -> object:
     """A rotation vector, or one of its other notations."""
     if is_orientation(value):
         return checked_orientation(value)
-    if isinstance(value, Part) or (isinstance(value, Mapping) and value.get("kind") == "rotation"):
+    if isinstance(value, KeyedPart) or (isinstance(value, Mapping) and value.get("kind") == "rotation"):
         return value
     if isinstance(value, Mapping):
         raise InputError(expected="a rotation vector, {rpy: ...} or {quaternion: ...}", got=value)
@@ -136,7 +136,7 @@ def _short(value: object) -> object:
     """A bare number or list stands for a constant, {rpy: ...} and {quaternion: ...} for an orientation."""
     if is_orientation(value):
         return checked_orientation(value)
-    return value if isinstance(value, Mapping | Part) else {"kind": "constant", "value": value}
+    return value if isinstance(value, Mapping | KeyedPart) else {"kind": "constant", "value": value}
 
 
 def _point(value: object) -> object:

@@ -66,7 +66,7 @@ def each(parts: Iterable[P], make: Callable[[P], T], *place: str | int) -> list[
     return made
 
 
-class Part(BaseModel):
+class KeyedPart(BaseModel):
     """A mapping with known keys. A subclass states them, and makes its object in a method of its own."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
@@ -125,19 +125,19 @@ class OneOf:
     pydantic builds the validator of a part when a value is of its kind: all of them take a tenth of a run.
     """
 
-    parts: Mapping[str, type[Part]]
+    parts: Mapping[str, type[KeyedPart]]
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.with_info_plain_validator_function(self._read)
 
-    def _read(self, value: Any, info: ValidationInfo) -> Part:
-        if isinstance(value, Part) and type(value) in self.parts.values():
+    def _read(self, value: Any, info: ValidationInfo) -> KeyedPart:
+        if isinstance(value, KeyedPart) and type(value) in self.parts.values():
             return value
         if not isinstance(value, Mapping):
             raise InputError(expected="a mapping (key: value)", got=value)
         if "kind" not in value:
             for key in value:
-                if hint := Part.without_blank(str(key), ("kind",)):
+                if hint := KeyedPart.without_blank(str(key), ("kind",)):
                     raise KeyedError((str(key),), f"unknown key {quoted(key)}{hint}")
             raise KeyedError(("kind",), "this key is missing", available=self.parts)
         kind = value["kind"]

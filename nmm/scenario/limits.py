@@ -16,7 +16,7 @@ from nmm.control.steering import Steering
 from nmm.model.robots.robot import Robot
 from nmm.scenario.constructors import FunctionPart, MadePart, keys_of, part_of
 from nmm.scenario.functions import with_functions
-from nmm.scenario.keys import OneOf, Part, each
+from nmm.scenario.keys import KeyedPart, OneOf, each
 from nmm.scenario.numbers import Nested, Number, Numbers, Positive, Speeds, Whole, nested
 
 
@@ -109,7 +109,7 @@ class LimitsPart(
 def part_or_none(value: object) -> object:
     if isinstance(value, bool) or value is None:
         return {} if value else None
-    if not isinstance(value, Mapping | Part):
+    if not isinstance(value, Mapping | KeyedPart):
         raise InputError(expected="true, false or a mapping (key: value)", got=value)
     return value
 

@@ -25,7 +25,7 @@ from nmm.scenario.constructors import (
     part_of,
 )
 from nmm.scenario.functions import Reference
-from nmm.scenario.keys import FUNCTION, NUMBER, OneOf, Part, at, each, is_path
+from nmm.scenario.keys import FUNCTION, NUMBER, KeyedPart, OneOf, at, each, is_path
 from nmm.scenario.numbers import Number, Positive
 
 
@@ -67,7 +67,7 @@ class ObjectivePart(MadePart):
         return objective if factor == 1.0 else factor * objective
 
 
-class TermPart(Part):
+class TermPart(KeyedPart):
     """½ weight (of - target)²."""
 
     of: Combination = Field(description="a coordinate (q1) or a combination ({theta: 1, q1: 1, q2: 1})")

@@ -12,7 +12,7 @@ from nmm.base.kinds import REFERENCES, RESOLVERS, TASKS
 from nmm.scenario.collisions import SHAPE_PARTS, CollisionsPart, ObstaclePart
 from nmm.scenario.disturbances import DisturbancesPart
 from nmm.scenario.functions import FUNCTION_PARTS, REFERENCE_PARTS, CameraFaultsPart
-from nmm.scenario.keys import Part
+from nmm.scenario.keys import KeyedPart
 from nmm.scenario.limits import (
     LIMIT_PARTS,
     BoundPart,
@@ -32,7 +32,7 @@ from nmm.scenario.tasks import CONDITION_PARTS, TASK_PARTS
 YAML = {"None": "null", "True": "true", "False": "false"}
 
 
-class Section(NamedTuple):
+class ReferenceSection(NamedTuple):
     """A part of a scenario: where it stands, what it is, and its keys as (key, default, description)."""
 
     title: str
@@ -40,7 +40,7 @@ class Section(NamedTuple):
     keys: list[tuple[str, str, str]]
 
 
-def sections() -> Iterator[Section]:
+def sections() -> Iterator[ReferenceSection]:
     """The parts of a scenario, from the top; a reference that is a task's function too is listed once."""
     yield _section("the file", schema())
     yield _section("robot", RobotPart)
@@ -71,7 +71,7 @@ def sections() -> Iterator[Section]:
     yield _section("scene.scenery", SceneryPart)
 
 
-def _of_plugins() -> Iterator[Section]:
+def _of_plugins() -> Iterator[ReferenceSection]:
     for key, addition in section_names(ScenarioPart.model_fields).items():
         if (section := section_class(addition)) is not None:
             yield _section(key, section)
@@ -80,8 +80,8 @@ def _of_plugins() -> Iterator[Section]:
 
 
 def _kinds(
-    where: str, parts: Mapping[str, type[Part]], called: Mapping[str, str] = MappingProxyType({})
-) -> Iterator[Section]:
+    where: str, parts: Mapping[str, type[KeyedPart]], called: Mapping[str, str] = MappingProxyType({})
+) -> Iterator[ReferenceSection]:
     """The kinds of a part, one by one; keys that all of them have stand once, before."""
     sections = []
     for kind, part in parts.items():
@@ -92,12 +92,12 @@ def _kinds(
         sections.append(section)
     shared = [key for key in sections[0].keys if all(key in section.keys for section in sections)]
     if shared:
-        yield Section(f"{where}, of any kind", "Beside the kind's own keys.", shared)
+        yield ReferenceSection(f"{where}, of any kind", "Beside the kind's own keys.", shared)
     for section in sections:
         yield section._replace(keys=[key for key in section.keys if key not in shared])
 
 
-def _section(title: str, part: type[Part], called: str = "") -> Section:
+def _section(title: str, part: type[KeyedPart], called: str = "") -> ReferenceSection:
     keys = []
     for name, field in part.model_fields.items():
         if name == "kind":
@@ -105,7 +105,7 @@ def _section(title: str, part: type[Part], called: str = "") -> Section:
         default = field.get_default(call_default_factory=True)
         text = "required" if default is PydanticUndefined else _text(default)
         keys.append((name, text, _in_yaml(field.description or "")))
-    return Section(title, called + " ".join((part.__doc__ or "").split()), keys)
+    return ReferenceSection(title, called + " ".join((part.__doc__ or "").split()), keys)
 
 
 def _in_yaml(text: str) -> str:

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, WrapValidator, mode
 
 from nmm.base.errors import InputError, expect_known
 from nmm.scenario.files import FileName, NamedFolder, file_or_package, readable
-from nmm.scenario.keys import KeyedError, Part, at
+from nmm.scenario.keys import KeyedError, KeyedPart, at
 from nmm.scenario.numbers import Number, number, numbers, numbers_by_name
 from nmm.scenario.yaml_text import Place
 
@@ -79,7 +79,7 @@ def _plain(value: object) -> Any:
 Three = Annotated[list[float], BeforeValidator(lambda value: _point(value, (3,), "3 numbers"))]
 
 
-class RobotPart(Part):
+class RobotPart(KeyedPart):
     """Which robot. A bare name or path in its place is its source."""
 
     source: Annotated[str, AfterValidator(_source), BeforeValidator(readable)] = Field(
@@ -146,7 +146,7 @@ def _named(value: object) -> object:
 AnyRobotPart = Annotated[RobotPart, BeforeValidator(_named)]
 
 
-class ArmPart(Part):
+class ArmPart(KeyedPart):
     """An arm, and where it is mounted."""
 
     arm: AnyRobotPart = Field(description="the arm: a name, a path, or a mapping with the keys of a robot")
@@ -169,7 +169,7 @@ class ArmPart(Part):
             return mount(platform, arm, at=self.at, placement=(self.xyz, self.rpy), prefix=self.prefix)
 
 
-class MountedPart(Part):
+class MountedPart(KeyedPart):
     """A platform with arms on it: as a robot with `arm`, `at`, `xyz`, `rpy`, `prefix`, or with `arms`."""
 
     platform: AnyRobotPart = Field(

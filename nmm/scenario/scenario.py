@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from nmm.model.robots.robot import Robot
     from nmm.motion.recording import Recorder
     from nmm.motion.trajectory import Trajectory
-    from nmm.scenario.sections import Motion
+    from nmm.scenario.sections import SectionMotion
 
 SUFFIXES = (".yaml", ".yml")
 #: The kind of a resolver that is no kind of ours.
@@ -190,7 +190,7 @@ class Scenario:
         """
         return cast("Plan", self._motion("plan", progress))
 
-    def _motion(self, section: str, progress: Progress | None) -> Motion:
+    def _motion(self, section: str, progress: Progress | None) -> SectionMotion:
         from nmm.scenario.sections import Making
 
         robot = self.robot()

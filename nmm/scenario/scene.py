@@ -12,7 +12,7 @@ from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.surroundings import Body, Carried, Surroundings
 from nmm.scenario.collisions import SHAPE_PARTS, ShapePart
-from nmm.scenario.keys import OneOf, Part, at
+from nmm.scenario.keys import KeyedPart, OneOf, at
 from nmm.scenario.numbers import Number, Positive, numbers
 from nmm.scenario.robot import Three
 
@@ -30,7 +30,7 @@ def _camera(value: object) -> object:
     return values
 
 
-class DrawnPart(Part):
+class DrawnPart(KeyedPart):
     """A shape that is drawn."""
 
     name: str = Field("", description="the shape's kind when not given")
@@ -61,7 +61,7 @@ class SceneryPart(DrawnPart):
     """A shape that stands in the world and is no obstacle; xyz and rpy are in the world's axes."""
 
 
-class ScenePart(Part):
+class ScenePart(KeyedPart):
     """What is drawn beside robot and task, and how the page opens. Controllers know nothing of it."""
 
     carried: list[CarriedPart] = Field(default_factory=list, description="shapes that frames carry")

@@ -24,14 +24,14 @@ from nmm.scenario.collisions import CollisionsPart
 from nmm.scenario.disturbances import DisturbancesPart
 from nmm.scenario.files import Absolute
 from nmm.scenario.functions import REFERENCE_PARTS
-from nmm.scenario.keys import KeyedError, Part, at
+from nmm.scenario.keys import KeyedError, KeyedPart, at
 from nmm.scenario.limits import GoalPart, LimitsPart, RetreatPart, SteeringPart, part_or_none
 from nmm.scenario.numbers import Nested, Positive, integer, numbers, numbers_by_name
 from nmm.scenario.objectives import ObjectiveList, QuadraticPart, build_objective
 from nmm.scenario.resolvers import AnyResolver, WithAddedTask
 from nmm.scenario.robot import RobotChoice
 from nmm.scenario.scene import ScenePart
-from nmm.scenario.sections import Making, Motion, Section, about, section_class, section_names
+from nmm.scenario.sections import Making, Section, SectionMotion, about, section_class, section_names
 from nmm.scenario.tasks import TASK_PARTS, TaskList, TaskPart, build_tasks, listed
 
 
@@ -48,7 +48,7 @@ def start_of(value: object) -> dict[str, Any] | list[Nested]:
     return {POSTURE: named, **numbers_by_name(rest)}
 
 
-class ScenarioPart(Part):
+class ScenarioPart(KeyedPart):
     """A scenario: robot, start, time, task, objective, resolver."""
 
     name: str = Field(
@@ -140,7 +140,7 @@ class ScenarioPart(Part):
         taken = any(section.takes_until for section in self.sections().values())
         return None if self.until is None or taken else self.until.make()
 
-    def motion(self, key: str, making: Making) -> Motion:
+    def motion(self, key: str, making: Making) -> SectionMotion:
         """The motion of a section, or of the section with its defaults; `RunError` where there is none."""
         section = self.section(key)
         if section is None:

@@ -16,13 +16,13 @@ from nmm.base.plugins import Addition, additions, complain
 from nmm.base.progress import Progress
 from nmm.control.functions.tasks.task import Task
 from nmm.model.robots.robot import Robot
-from nmm.scenario.keys import KeyedError, Part
+from nmm.scenario.keys import KeyedError, KeyedPart
 
 if TYPE_CHECKING:
     from nmm.motion.trajectory import Trajectory
 
 
-class Motion(Protocol):
+class SectionMotion(Protocol):
     """A motion that a section makes in place of the closed loop's."""
 
     def trajectory(self, dt: float) -> Trajectory: ...
@@ -38,7 +38,7 @@ class Making:
     progress: Progress | None = None
 
 
-class Section(Part):
+class Section(KeyedPart):
     """A mapping of a scenario's file that a plugin adds; `true` is it with its defaults, `false` none.
 
     A subclass states its keys as fields of pydantic, and what it does in the methods that it overrides. An
@@ -50,7 +50,7 @@ class Section(Part):
     #: The key behind which it is listed; the last where none is named.
     after: ClassVar[str] = ""
     #: Parts of it that are listed by themselves, by their dotted place.
-    listed: ClassVar[Mapping[str, type[Part]]] = {}
+    listed: ClassVar[Mapping[str, type[KeyedPart]]] = {}
     #: Keys of a run that a controller depends on with this section, and on which it does not without: "q0".
     needs: ClassVar[tuple[str, ...]] = ()
     #: Whether `until` is for the section, so that a run does not end at the task's target.
@@ -70,7 +70,7 @@ class Section(Part):
         """The controller's tasks, from those of the file: the same, more of them, or others."""
         return tasks
 
-    def motion(self, making: Making) -> Motion:
+    def motion(self, making: Making) -> SectionMotion:
         """The motion that a run is where the section `moves`; `RunError` where there is none."""
         raise NotImplementedError
 

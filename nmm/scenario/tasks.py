@@ -12,11 +12,11 @@ from nmm.control.functions.tasks.task import Task
 from nmm.model.robots.robot import Robot
 from nmm.scenario.constructors import FunctionPart, keys_of
 from nmm.scenario.functions import FUNCTION_PARTS, Reference, with_functions
-from nmm.scenario.keys import OneOf, Part, at, each
+from nmm.scenario.keys import KeyedPart, OneOf, at, each
 from nmm.scenario.numbers import Number, Numbers, Positive, Speeds
 
 
-class ConditionPart(Part):
+class ConditionPart(KeyedPart):
     """A condition of the class `makes`, of whose constructor its keys are the arguments."""
 
     makes: ClassVar[Callable[..., Condition]]

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 
-from nmm.analysis.maps.reach import Reach
+from nmm.analysis.maps.reach import ArmReach
 from nmm.analysis.maps.search import Grid, Layer
 from nmm.analysis.maps.workspace import workspace_map
 from nmm.analysis.singular.jacobians import Jacobians
@@ -98,7 +98,7 @@ def test_the_number_of_threads_changes_no_bit(
     jacobians = Jacobians((robot_3r, Position("ee", "xy")))
     q = rng.uniform(-3.0, 3.0, (3500, robot_3r.n))
     moving = np.flatnonzero([name in ("q1", "q2", "q3") for name in robot_3r.q_names])
-    reach = Reach(robot_3r, "ee", "xy", None, robot_3r.rest, moving, None)
+    reach = ArmReach(robot_3r, "ee", "xy", None, robot_3r.rest, moving, None)
     postures = reach.postures(4096)
     targets = reach.positions(postures)[:, :2] + 0.1
 
@@ -132,7 +132,7 @@ def test_newtons_steps_put_the_frame_where_pinocchio_has_it(
     slab: tuple[float, float] | None, ur5: Robot, rng: np.random.Generator
 ) -> None:
     moving = ur5.arm_coordinates[:3]
-    reach = Reach(ur5, "tool0", "xy", slab, ur5.rest, moving, None)
+    reach = ArmReach(ur5, "tool0", "xy", slab, ur5.rest, moving, None)
     start = reach.postures(256)
     joints = start[:, moving] + rng.uniform(-0.1, 0.1, (256, 3))
     goals = reach.positions(reach.placed(np.clip(joints, reach.lower, reach.upper)))

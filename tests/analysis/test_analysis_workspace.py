@@ -12,7 +12,7 @@ from planar_arms import link_lengths
 from sliding_arm import sliding
 
 from nmm.analysis import analyse
-from nmm.analysis.maps.reach import Reach
+from nmm.analysis.maps.reach import ArmReach
 from nmm.analysis.maps.result import Map
 from nmm.analysis.maps.search import BENT
 from nmm.analysis.maps.workspace import in_curves, workspace_map
@@ -196,7 +196,7 @@ def test_no_posture_drawn_is_better_than_the_best_or_worse_than_the_worst(ur5: R
     subject, frame = (ur5, Position("tool0")), "tool0"
     made = workspace_map(subject, samples=24, configurations=256)
     moving = np.arange(3, 8)  # the last joint turns the tool about its own origin
-    q = Reach(ur5, frame, "xy", None, made.q, moving, None).postures(256)
+    q = ArmReach(ur5, frame, "xy", None, made.q, moving, None).postures(256)
     best, worst = made.values["sigma_min"], made.worst["sigma_min"]
     drawn = np.full(best.shape, np.nan)
     cell = made.axes[0][1] - made.axes[0][0]

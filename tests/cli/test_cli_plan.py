@@ -7,7 +7,7 @@ import pytest
 
 import nmm
 from nmm.cli.exit_status import status_of
-from nmm.plugins.planning.search import Search
+from nmm.plugins.planning.search import PlanSearch
 
 POSE = "x=2,y=1,theta=pi/2"
 
@@ -127,6 +127,6 @@ def test_an_interrupted_search_writes_nothing(tmp_path, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Search, "way", interrupted)
+    monkeypatch.setattr(PlanSearch, "way", interrupted)
     assert status_of(("plan", "unicycle_3r", "--to", POSE, "--out", str(tmp_path / "out"))) == 130
     assert not (tmp_path / "out").exists()

@@ -21,7 +21,7 @@ from nmm.base.figure_options import FigureOptions
 from nmm.base.machine import made_with
 from nmm.base.text_format import number_text
 from nmm.cli.paper import PaperReport, write, write_paper
-from nmm.cli.paper.cases import CASES, CaseResult, Claim, Row
+from nmm.cli.paper.cases import CASES, CaseResult, CaseRow, PaperClaim
 from nmm.cli.paper.claims import claims, decay_rate, ripple, settling_time, smallest_determinant
 from nmm.cli.paper.write import render
 from nmm.motion.trajectory import Trajectory
@@ -130,8 +130,8 @@ def test_page_opens_in_a_browser(paper: tuple[PaperReport, list[float]], browser
 
 
 def result(number: int, found: str = "so") -> CaseResult:
-    row = Row("a quantity", "m", "1", "2")
-    return CaseResult(number, (row,), (Claim("it is so", "somewhere", found, True),), 11, 0.1)
+    row = CaseRow("a quantity", "m", "1", "2")
+    return CaseResult(number, (row,), (PaperClaim("it is so", "somewhere", found, True),), 11, 0.1)
 
 
 @pytest.fixture
@@ -208,7 +208,7 @@ def test_page_escapes_text() -> None:
 def test_page_tells_when_a_claim_fails() -> None:
     good = render([result(1)])
     assert "All 1 statements" in good
-    failed = replace(result(1), claims=(Claim("it is so", "somewhere", "it is not", False),))
+    failed = replace(result(1), claims=(PaperClaim("it is so", "somewhere", "it is not", False),))
     bad = render([failed])
     assert "1 of the 1 statements checked below do not come out" in bad
     assert "✗" in bad

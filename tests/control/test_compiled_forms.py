@@ -24,7 +24,7 @@ from nmm.base.kernels.record_layout import Memory, views
 from nmm.base.kernels.records import At, Frames, Rows
 from nmm.control.controller import Controller
 from nmm.control.functions.function import Stage
-from nmm.control.functions.objectives import Sum
+from nmm.control.functions.objectives import WeightedSum
 from nmm.control.functions.program import Program, evaluate
 from nmm.control.functions.tasks import LinearCoordinates, Task
 from nmm.control.functions.tasks.task import Comparison
@@ -116,7 +116,7 @@ def stage_arguments(stage: Stage, t: float, configuration: Configuration) -> tup
     return At(t, q, robot.platform.G(qp), np.ascontiguousarray(G_q)), frames, numbers
 
 
-SINGLE = [entry for entry in ENTRIES if not isinstance(entry.function, Sum)]
+SINGLE = [entry for entry in ENTRIES if not isinstance(entry.function, WeightedSum)]
 
 
 @pytest.mark.parametrize("entry", SINGLE, ids=[entry.name for entry in SINGLE])

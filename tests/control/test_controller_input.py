@@ -20,7 +20,7 @@ from nmm.control.functions.objectives import (
     Manipulability,
     Quadratic,
     QuadraticTerm,
-    Sum,
+    WeightedSum,
 )
 from nmm.control.functions.program import evaluate
 from nmm.control.functions.references import (
@@ -286,14 +286,16 @@ def test_errors_have_one_root() -> None:
             {"where": "controller"},
         ),
         (
-            lambda robot: Controller(robot, [TIP], ProjectedGradient(), Sum((1.0, Position("ee", "xy")))),
+            lambda robot: Controller(
+                robot, [TIP], ProjectedGradient(), WeightedSum((1.0, Position("ee", "xy")))
+            ),
             {"where": "objective", "got": ["ee.x", "ee.y"]},
         ),
         (lambda robot: Task("ee", [1, 2]), {"where": "task", "got": "ee"}),
         (lambda robot: Quadratic(QuadraticTerm({})), {"where": "quadratic objective", "got": None}),
         (lambda robot: H1 + 3, {"where": "objective", "got": 3}),
         (lambda robot: 3 + H1, {"where": "objective", "got": 3}),
-        (lambda robot: Sum(), {"where": "sum of objectives"}),
+        (lambda robot: WeightedSum(), {"where": "sum of objectives"}),
         (lambda robot: Controller(robot, [TIP], ProjectedGradient())(0.0, None), {"where": "q", "got": None}),
         (
             lambda robot: Controller(robot, [TIP], ProjectedGradient()).velocity(0.0, [0.0]),

@@ -30,7 +30,7 @@ from nmm.control.functions.objectives import (
     Objective,
     Quadratic,
     QuadraticTerm,
-    Sum,
+    WeightedSum,
 )
 from nmm.control.functions.program import Program, evaluate
 from nmm.control.functions.pursuit import Pursuit
@@ -76,7 +76,7 @@ def test_functions_laid_out_together_do_not_disturb_each_other(
     name: str, robots: dict[str, Robot], rng: np.random.Generator
 ) -> None:
     robot = robots[name]
-    listed = [e.function for e in ENTRIES if name in e.robots and not isinstance(e.function, Sum)]
+    listed = [e.function for e in ENTRIES if name in e.robots and not isinstance(e.function, WeightedSum)]
     functions = [listed[k] for k in rng.permutation(len(listed))]
     program = Program(robot, functions)
     program.lay_out()
@@ -93,7 +93,7 @@ def test_an_objective_as_a_function_is_its_value_and_gradient(
 ) -> None:
     configuration = Configuration(robot_3r, random_configuration(robot_3r, rng))
     for function in (entry.function for entry in ENTRIES):
-        if isinstance(function, Objective) and not isinstance(function, Sum):
+        if isinstance(function, Objective) and not isinstance(function, WeightedSum):
             found = evaluate(function, 0.0, configuration)
             assert found.value[0] == function.value(configuration)
             np.testing.assert_array_equal(found.value_q[0], function.gradient(configuration))

@@ -20,7 +20,7 @@ from nmm.base.kernels.compiled import PLATFORM, Kernel, kernel
 from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.control.controller import Controller
 from nmm.control.functions.function import Function, Row, Shown, Stage
-from nmm.control.functions.objectives import Manipulability, Sum
+from nmm.control.functions.objectives import Manipulability, WeightedSum
 from nmm.control.functions.references import Line
 from nmm.control.functions.tasks import CallableFunction, Position, Task
 from nmm.control.resolvers import (
@@ -179,7 +179,7 @@ def test_function_with_its_own_kernel(robot_3r: Robot, rng: np.random.Generator)
 
     q = random_configuration(robot_3r, rng)
     check_function(SquareDistance("link2", "ee", 3.0), robot_3r, 0.4, q)
-    objective = Sum((0.3, own), (1.0, Manipulability("ee")))
+    objective = WeightedSum((0.3, own), (1.0, Manipulability("ee")))
     inputs = []
     for function in (own, CallableFunction(distance, ["distance"])):
         task = Task(function, Line(0.5, 1.5, 3.0))

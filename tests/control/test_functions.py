@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PPoly
 
 from nmm.control.functions.function import Evaluation, Function
-from nmm.control.functions.objectives import JointRange, Manipulability, Quadratic, QuadraticTerm, Sum
+from nmm.control.functions.objectives import JointRange, Manipulability, Quadratic, QuadraticTerm, WeightedSum
 from nmm.control.functions.program import evaluate
 from nmm.control.functions.references import (
     Bearing,
@@ -226,8 +226,13 @@ def test_sums(robot_2r: Robot) -> None:
         (a - b, -4.5),
         (-a, -8.0),
         (2.0 * a - (a + b) * 3.0, -45.5),
-        (Sum((2.0, a), (-1.0, b)), 3.5),
-        (Sum((2.0, Sum((3.0, a), (1.0, b))), (1.0, -(a + b)), (10.0, LinearCoordinates("x"))), 62.5),
+        (WeightedSum((2.0, a), (-1.0, b)), 3.5),
+        (
+            WeightedSum(
+                (2.0, WeightedSum((3.0, a), (1.0, b))), (1.0, -(a + b)), (10.0, LinearCoordinates("x"))
+            ),
+            62.5,
+        ),
     ):
         assert objective.value(configuration) == worth
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from short_scenario import scenario
 
 import nmm
-from nmm.control.functions.objectives import Sum
+from nmm.control.functions.objectives import WeightedSum
 from nmm.control.functions.objectives.jacobian import ROWS
 
 Array = NDArray[np.float64]
@@ -396,7 +396,7 @@ REFUSED: list[tuple[Callable[[Path], object], str]] = [
     (made(lambda: nmm.Alignment(0.0, of="psi")), "unknown coordinate 'psi'"),
     (made(lambda: nmm.PotentialEnergy([0, 0, 0])), "gravity: expected a vector that is not zero"),
     (made(lambda: nmm.Circle([0, 0], 1, 1) * nmm.PotentialEnergy()), "weight: expected a function of one"),
-    (made(lambda: Sum((1.0, nmm.Position("ee")))), "expected terms of one row"),
+    (made(lambda: WeightedSum((1.0, nmm.Position("ee")))), "expected terms of one row"),
     (lambda _: nmm.VelocityOf(nmm.Position("ee")), "of: expected a circle without run_up, line, "),
     (posed("{kind: posture, posture: {q1: [1, 2]}}"), "target of q1: expected one row"),
     (posed("{kind: posture, posture: {q1: fast}}"), "posture.q1.*expected a number"),

@@ -32,10 +32,10 @@ from nmm.control.functions.objectives import (
     PreferredPosture,
     Quadratic,
     QuadraticTerm,
-    Sum,
     WeightedManipulability,
+    WeightedSum,
 )
-from nmm.control.functions.objectives.base import Product
+from nmm.control.functions.objectives.base import WeightedFunction
 from nmm.control.functions.program import evaluate
 from nmm.control.functions.references import (
     Bearing,
@@ -295,10 +295,10 @@ def _objectives() -> Iterator[Entry]:
     yield Entry("callable objective, gradient", CallableObjective(_height, _height_gradient))
     yield Entry(
         "sum",
-        Sum((2.0, h1), (-0.5, Manipulability("ee", "xy")), (1.0, LinearCoordinates("x"))),
+        WeightedSum((2.0, h1), (-0.5, Manipulability("ee", "xy")), (1.0, LinearCoordinates("x"))),
         (*BOTH, *FOLDING),
     )
-    yield Entry("sum of sums", Sum((3.0, h1 + CallableObjective(_height)), (-2.0, h1 - 0.5 * h1)))
+    yield Entry("sum of sums", WeightedSum((3.0, h1 + CallableObjective(_height)), (-2.0, h1 - 0.5 * h1)))
     yield Entry("negative", -Manipulability("ee", "xy", "arm"))
     yield Entry("difference", 2.0 * h1 - Manipulability("ee", "xy") * 0.3)
 
@@ -360,8 +360,10 @@ def _of_coordinates() -> Iterator[Entry]:
     ):
         yield Entry(f"alignment with {name}", one, everywhere)
     w = Manipulability("ee", "xy")
-    yield Entry("product", Product(w, line), everywhere)
-    yield Entry("product with a pose's function", Product(PreferredPosture({"q1": line}), Heading("link1")))
+    yield Entry("product", WeightedFunction(w, line), everywhere)
+    yield Entry(
+        "product with a pose's function", WeightedFunction(PreferredPosture({"q1": line}), Heading("link1"))
+    )
     yield Entry("weights that change", line * w + spline * (bent - 2.0 * w), everywhere)
 
 

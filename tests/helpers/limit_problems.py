@@ -17,7 +17,7 @@ import daqp
 import numpy as np
 from scipy.optimize import linprog, nnls
 
-from nmm.base.kernels.active_set import Rows, nearest_within
+from nmm.base.kernels.active_set import ConstraintRows, nearest_within
 
 #: Rows of the task, inputs, rows of limits.
 SIZES = ((2, 4, 4), (3, 5, 5), (6, 10, 10), (6, 10, 18), (6, 18, 40))
@@ -35,9 +35,11 @@ class Example(NamedTuple):
     target: np.ndarray
 
     @property
-    def rows(self) -> Rows:
+    def rows(self) -> ConstraintRows:
         s, c = len(self.J), len(self.G)
-        return Rows(self.J, np.zeros(s), self.J @ self.target, self.G, self.lower, self.upper, np.zeros(c))
+        return ConstraintRows(
+            self.J, np.zeros(s), self.J @ self.target, self.G, self.lower, self.upper, np.zeros(c)
+        )
 
 
 class Found(NamedTuple):

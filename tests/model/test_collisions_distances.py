@@ -7,7 +7,7 @@ import pytest
 import nmm
 from nmm.base.kernels.record_layout import Memory, views
 from nmm.model.collisions.pairs import random_configurations
-from nmm.model.collisions.rows import Rows, no_rows
+from nmm.model.collisions.rows import DistanceRows, no_rows
 
 
 def rows_at(setting, t, q, most=60):
@@ -16,7 +16,7 @@ def rows_at(setting, t, q, most=60):
     memory.add(no_rows(setting.robot.n, most))
     blocks = memory.blocks()
     setting.queries.update(t, q, *blocks, 0)
-    return views(Rows, *blocks, 0), setting.queries.least
+    return views(DistanceRows, *blocks, 0), setting.queries.least
 
 
 @pytest.fixture(scope="module")

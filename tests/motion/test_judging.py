@@ -10,7 +10,7 @@ from nmm.control.step.idle_inputs import _configurations
 from nmm.model.robots.frame_path import FramePath
 from nmm.model.robots.robot import CENTER_OF_MASS
 from nmm.motion.diagnosis.assessment import linearisation, linearisations
-from nmm.motion.diagnosis.error_bound import SAFETY, Feedback, Samples, step_errors
+from nmm.motion.diagnosis.error_bound import SAFETY, Feedback, TaskSamples, step_errors
 
 CASES = ("unicycle_2r_position", "tiago_tray", "unicycle_2r_switching")
 
@@ -71,7 +71,7 @@ def test_the_error_of_a_step_is_its_formula(order: int) -> None:
     partition[20:] = [1, 2]
     K = np.array([[2.0, 0.3], [0.0, 1.0]])
     rows = np.full(s, np.inf), np.full(s, np.inf), np.zeros(s, dtype=np.int64)
-    samples = Samples(t, error, moved + error @ K.T, J, u, np.zeros(N), partition, Feedback(K, *rows))
+    samples = TaskSamples(t, error, moved + error @ K.T, J, u, np.zeros(N), partition, Feedback(K, *rows))
 
     def change(values: np.ndarray) -> np.ndarray:
         flat = values.reshape(N, -1)

@@ -18,7 +18,7 @@ from nmm.base.errors import InputError
 from nmm.base.figure_options import WIDTHS, FigureOptions
 from nmm.scenario import Scenario
 from nmm.views.figures.composed import write_run_figures
-from nmm.views.figures.motion import Scene
+from nmm.views.figures.motion import MotionScene
 from nmm.views.figures.silhouette import hull
 from nmm.views.figures.time_labels import Place
 from nmm.views.figures.views import ABOVE, SIDE, upright
@@ -34,7 +34,7 @@ def test_times_touch_nothing(k: int, name: str) -> None:
     beside it."""
     width = (WIDTHS["column"], 5.2)[k % 2]
     trajectory = Scenario.load(name).run()
-    scene = Scene(trajectory)
+    scene = MotionScene(trajectory)
     made = figures.stroboscopic(trajectory, width=width)
     axes = made.axes[0]
     axes.grid(False)

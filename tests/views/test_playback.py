@@ -23,7 +23,7 @@ from nmm.views.playback.keyframes import LARGEST_TURN, ghost_samples, ghost_time
 from nmm.views.playback.meshes import OFF
 from nmm.views.playback.placements import Placements
 from nmm.views.playback.scene import playback_scene
-from nmm.views.playback.shapes import Shape, shapes
+from nmm.views.playback.shapes import PageShape, shapes
 
 fcl = pin.hppfcl
 SHARE = Path(sys.prefix) / "lib" / f"python{sys.version_info[0]}.{sys.version_info[1]}" / "site-packages"
@@ -180,7 +180,7 @@ def unpacked(value: dict[str, str]) -> np.ndarray:
     )
 
 
-def mesh(shape: Shape) -> trimesh.Trimesh:
+def mesh(shape: PageShape) -> trimesh.Trimesh:
     """The triangles that the page draws."""
     data = shape.geometry["data"]
     vertices = unpacked(data["attributes"]["position"]["array"]).reshape(-1, 3)

@@ -53,7 +53,7 @@ def eccentricity(values: Array) -> Array:
     return np.asarray(np.sqrt((1.0 - ratio) * (1.0 + ratio)))
 
 
-class Measure(NamedTuple):
+class MapMeasure(NamedTuple):
     """One number for each J, `of` (alpha, singular values (N, s) of each part) -> (N,), as in "sigma" or
     "volume" `unit`s.
 
@@ -71,31 +71,31 @@ class Measure(NamedTuple):
 
 
 #: The measures by name. A new one is a line here.
-MEASURES: Mapping[str, Measure] = {
-    "sigma_min": Measure(
+MEASURES: Mapping[str, MapMeasure] = {
+    "sigma_min": MapMeasure(
         "σ_min", "the task's slowest velocity for inputs of size 1", "sigma", lambda _, own: own[:, -1]
     ),
-    "inverse_condition": Measure(
+    "inverse_condition": MapMeasure(
         "σ_min / σ_max",
         "inverse condition number: 1 isotropic, 0 singular",
         "",
         lambda _, own: inverse_condition(own),
     ),
-    "manipulability": Measure("w", "manipulability sqrt(det J Jᵀ)", "volume", lambda _, own: volume(own)),
-    "arm_manipulability": Measure(
+    "manipulability": MapMeasure("w", "manipulability sqrt(det J Jᵀ)", "volume", lambda _, own: volume(own)),
+    "arm_manipulability": MapMeasure(
         "w_b", "manipulability of the arm alone", "volume", lambda _, arm: volume(arm), ("arm",)
     ),
-    "platform_manipulability": Measure(
+    "platform_manipulability": MapMeasure(
         "w_p", "manipulability of the platform alone", "volume", lambda _, own: volume(own), ("platform",)
     ),
-    "weighted": Measure(
+    "weighted": MapMeasure(
         "α w_b + (1 − α) w",
         "manipulability of arm and whole robot, weighed",
         "volume",
         lambda alpha, arm, whole: alpha * volume(arm) + (1.0 - alpha) * volume(whole),
         ("arm", WHOLE),
     ),
-    "eccentricity": Measure(
+    "eccentricity": MapMeasure(
         "w_5",
         "eccentricity sqrt(1 − (σ_min/σ_max)²): 0 isotropic, 1 singular",
         "",
@@ -106,7 +106,7 @@ MEASURES: Mapping[str, Measure] = {
 }
 
 
-def unit_of(measure: Measure, row_units: Sequence[str], input_units: Sequence[str]) -> str:
+def unit_of(measure: MapMeasure, row_units: Sequence[str], input_units: Sequence[str]) -> str:
     """A measure's unit: "m/rad", "(m/rad)²"; "mixed units" where rows or inputs have several; "" for none."""
     if not measure.unit or not input_units:
         return ""

@@ -170,7 +170,7 @@ def lead_onto(
             advance(plane, posture, x, y, point, rates)
 
 
-class Reach:
+class ArmReach:
     """The arm's joints over their limits, the platform at rest at q (n,).
 
     plane, slab : two of x, y, z; (lower, upper) of the third, m, or None

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nmm.analysis.maps.measures import Evaluator
-from nmm.analysis.maps.reach import Reach
+from nmm.analysis.maps.reach import ArmReach
 from nmm.base.arrays import Array, Flags, Integers
 from nmm.base.errors import InputError
 from nmm.base.progress import Progress, between
@@ -129,7 +129,7 @@ class Layer:
         return every[inside][better], others[better]
 
 
-class Search:
+class PostureSearch:
     """Postures offered to the cells, for the best and the worst value of each measure.
 
     The cells, `longest` of them along the longer side, surround what `count` postures reach. `InputError`
@@ -137,7 +137,7 @@ class Search:
     """
 
     def __init__(
-        self, evaluator: Evaluator, reach: Reach, longest: int, count: int, progress: Progress | None
+        self, evaluator: Evaluator, reach: ArmReach, longest: int, count: int, progress: Progress | None
     ) -> None:
         self.evaluator, self.reach = evaluator, reach
         q = reach.postures(count)

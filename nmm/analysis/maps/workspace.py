@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from nmm.analysis.maps.coordinates import check_held, checked_range, sample_counts
 from nmm.analysis.maps.measures import Evaluator, Judged
-from nmm.analysis.maps.reach import AXES, Reach
+from nmm.analysis.maps.reach import AXES, ArmReach
 from nmm.analysis.maps.result import About, Map
-from nmm.analysis.maps.search import Search
+from nmm.analysis.maps.search import PostureSearch
 from nmm.analysis.maps.singular_set import SingularSet, curves_and_points, polish
 from nmm.analysis.singular.jacobians import Subject
 from nmm.base.arrays import Array, Integers, counted
@@ -99,7 +99,7 @@ def workspace_map(
     moving = _moving(evaluator, frame, held)
     if isinstance(at, Mapping):
         check_held(at, [robot.q_names[j] for j in moving], "at", VARIED)
-    reach = Reach(robot, frame, plane, slab, held, moving, ranges)
+    reach = ArmReach(robot, frame, plane, slab, held, moving, ranges)
     _check_plane(reach)
     # The stages' shares of the progress, as long as they take with three joints.
     shares = np.array([0.4, 0.35 if len(reach.moving) > 2 else 0.0, 0.05, 0.1, 0.05, 0.05])
@@ -108,7 +108,7 @@ def workspace_map(
     drawing, spreading, filling, evening, ours, arms = (
         between(progress, end - share, share) for end, share in ends
     )
-    search = Search(evaluator, reach, longest, 1 << (count - 1).bit_length(), drawing)
+    search = PostureSearch(evaluator, reach, longest, 1 << (count - 1).bit_length(), drawing)
     search.spread(spreading)
     search.fill(filling)
     search.even(evening)
@@ -171,7 +171,7 @@ def _moving(evaluator: Evaluator, frame: str, held: Array) -> Integers:
     return np.asarray(arm[moved], dtype=np.int64)
 
 
-def _check_plane(reach: Reach) -> None:
+def _check_plane(reach: ArmReach) -> None:
     """`InputError` for an arm that moves the frame in a plane seen edge-on; it says which plane that is."""
     points = reach.positions(reach.postures(EDGE_ON))
     size = np.ptp(points, axis=0)
@@ -188,7 +188,9 @@ def _check_plane(reach: Reach) -> None:
     raise InputError(f"{reach.frame} moves in {where}, {held} only; try --workspace {other}")
 
 
-def _singular_places(evaluator: Evaluator, reach: Reach, part: str, progress: Progress | None) -> SingularSet:
+def _singular_places(
+    evaluator: Evaluator, reach: ArmReach, part: str, progress: Progress | None
+) -> SingularSet:
     """Positions of the frame in singular postures of the part, those nearest to some drawn postures."""
     if len(evaluator.columns[part]) < len(evaluator.jacobians.rows):
         return SingularSet(everywhere=True)

@@ -17,8 +17,8 @@ from nmm.analysis.null_space.null_fields import (
     UNDEFINED,
     WORDS,
     Direction,
-    Ended,
     Field,
+    MotionEnded,
     direction_at,
     expect_direction,
     follow,
@@ -150,7 +150,9 @@ def self_motion(
     rank = jacobians.rank(J, TOLERANCE)
     expect_direction(robot, J, rank, direction)
     nearby = _nearby(jacobians, t, q, rank)
-    motion = _Motion(robot, held(jacobians, t, q), t, q, null_field(robot, J, nearby, rank, direction))
+    motion = _SelfMotionPath(
+        robot, held(jacobians, t, q), t, q, null_field(robot, J, nearby, rank, direction)
+    )
     steps = max(4, round(duration / dt))
     times = np.linspace(0.0, duration, steps + 1)
     samples, ended = motion.run(times, length)
@@ -193,7 +195,7 @@ def _nearby(jacobians: Jacobians, t: float, q: Array, rank: int) -> Array:
     return J_near
 
 
-class _Motion:
+class _SelfMotionPath:
     def __init__(self, robot: Robot, task: Stack, t: float, q: Array, field: Field) -> None:
         self.robot, self.t, self.q, self.field = robot, t, q, field
         self.controller = Controller(robot, task, ProjectedGradient(), steering=False, kinematics=COMPILED)
@@ -226,7 +228,7 @@ class _Motion:
                     at = time + h * dt / substeps
                     q = RK4.advance(velocity, at, q, q_dot, samples[-1].u, dt / substeps)
                     q_dot = velocity(time + (h + 1) * dt / substeps, q)
-        except Ended as ended:
+        except MotionEnded as ended:
             return samples, str(ended)
         return samples, ""
 
@@ -236,12 +238,14 @@ class _Motion:
         arguments = self.field, self.e0, self.angular, self.last, rate, GAIN, self.along
         outcome = self._follow(*self.controller.solver.blocks, *arguments)
         if outcome == UNDEFINED:
-            raise Ended(self.robot.platform.problem(q[: self.robot.platform.n_p]) or "the task is undefined")
+            raise MotionEnded(
+                self.robot.platform.problem(q[: self.robot.platform.n_p]) or "the task is undefined"
+            )
         if outcome == ALONE:
             names = listed([self.robot.u_names[column] for column in self.field.columns])
-            raise Ended(f"{names} alone come close to a singular configuration")
+            raise MotionEnded(f"{names} alone come close to a singular configuration")
         if outcome != FOLLOWED:
-            raise Ended(WORDS[outcome])
+            raise MotionEnded(WORDS[outcome])
         return self._q_dot.copy()
 
     def _sample(self, time: float, q: Array) -> Step:
@@ -250,10 +254,10 @@ class _Motion:
         beyond = np.flatnonzero((q < lower - 1e-9) | (q > upper + 1e-9))
         names = [self.robot.q_names[i] for i in beyond if i in self.robot.following.independent]
         if names:
-            raise Ended(f"{listed(names)} at the limit")
+            raise MotionEnded(f"{listed(names)} at the limit")
         problem = self.robot.platform.problem(q[: self.robot.platform.n_p])
         if problem is not None:
-            raise Ended(problem)
+            raise MotionEnded(problem)
         return replace(step, r_d=step.r + step.error, status=Status.SOLVED)
 
     def there_and_back(self, samples: list[Step], times: Array, length: float, ended: str) -> SelfMotion:

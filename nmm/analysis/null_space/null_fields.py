@@ -175,7 +175,7 @@ def follow(
     return FOLLOWED
 
 
-class Ended(Exception):
+class MotionEnded(Exception):
     """The motion cannot go on, and why."""
 
 
@@ -197,7 +197,7 @@ def expect_direction(
     wish = _wish(robot, direction, name)
     try:
         direction_at(J, _of_wish(wish, rank))
-    except Ended as ended:
+    except MotionEnded as ended:
         raise InputError(str(ended), where=name) from None
     return wish
 
@@ -222,12 +222,12 @@ def _of_wish(wish: Array, rank: int) -> Field:
 
 
 def direction_at(J: Array, field: Field) -> Array:
-    """The unit null vector (m,) of J (s, m) with which a field begins; `Ended` where it cannot."""
+    """The unit null vector (m,) of J (s, m) with which a field begins; `MotionEnded` where it cannot."""
     along = np.zeros(J.shape[1])
     arguments = np.ascontiguousarray(J, dtype=np.float64), field, np.zeros_like(along), along
     outcome = checked_by_caller(write_direction, DIRECTION)(*arguments)
     if outcome != FOLLOWED:
-        raise Ended(WORDS[outcome])
+        raise MotionEnded(WORDS[outcome])
     return along
 
 

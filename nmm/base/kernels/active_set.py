@@ -29,7 +29,7 @@ STEPS_PER_ROW, CUTS = 10, 60
 BACKS, BACK = 4, 1e-12
 
 
-class Rows(NamedTuple):
+class ConstraintRows(NamedTuple):
     """E (e, m), e0 and e1 (e,); G (c, m), lower, upper and give (c,)."""
 
     E: Matrix
@@ -41,7 +41,7 @@ class Rows(NamedTuple):
     give: Vector
 
 
-class Basis(NamedTuple):
+class ActiveNormals(NamedTuple):
     """The active normals n_i = Σ_j R[j, i] Q[j]; Q's first rows are orthonormal, R is upper triangular.
 
     members : row of E as -1 - row; row of G as 1 + row at its lower bound, 1 + row + c at its upper one
@@ -56,7 +56,7 @@ class Basis(NamedTuple):
 
 
 @compiled
-def normal(rows: Rows, member: int, n: Array) -> None:
+def normal(rows: ConstraintRows, member: int, n: Array) -> None:
     """The normal of a member: a row of E, or one of G that points into the allowed region."""
     c = rows.G.shape[0]
     if member < 0:
@@ -69,7 +69,7 @@ def normal(rows: Rows, member: int, n: Array) -> None:
 
 
 @compiled
-def bound(rows: Rows, member: int) -> tuple[float, float]:
+def bound(rows: ConstraintRows, member: int) -> tuple[float, float]:
     """(b0, b1): the bound on n . y is b0 + λ b1."""
     c = rows.G.shape[0]
     if member < 0:
@@ -82,7 +82,7 @@ def bound(rows: Rows, member: int) -> tuple[float, float]:
 
 
 @compiled
-def split(basis: Basis, k: int, n: Array) -> float:
+def split(basis: ActiveNormals, k: int, n: Array) -> float:
     """n = Σ_i d[i] Q[i] + v with v orthogonal to the first k rows; ‖v‖, or 0 where n is their combination."""
     d, v, parts, whole, full = basis.d, basis.v, scratch(k), dot(n, n), k == n.shape[0]
     copied(n, v)
@@ -103,7 +103,7 @@ def split(basis: Basis, k: int, n: Array) -> float:
 
 
 @compiled
-def append(basis: Basis, k: int, member: int, norm: float) -> int:
+def append(basis: ActiveNormals, k: int, member: int, norm: float) -> int:
     """Append the normal that was split last as member k; returns the number of members."""
     for i in range(k):
         basis.R[i, k] = basis.d[i]
@@ -116,14 +116,14 @@ def append(basis: Basis, k: int, member: int, norm: float) -> int:
 
 
 @compiled
-def join(basis: Basis, k: int, member: int, n: Array) -> int:
+def join(basis: ActiveNormals, k: int, member: int, n: Array) -> int:
     """Append n unless it is a combination of the first k; returns the number of members."""
     norm = split(basis, k, n)
     return append(basis, k, member, norm) if norm > 0.0 else k
 
 
 @compiled
-def drop(basis: Basis, k: int, dropped: int) -> int:
+def drop(basis: ActiveNormals, k: int, dropped: int) -> int:
     """Remove member number `dropped`; returns the number left."""
     Q, R = basis.Q, basis.R
     for i in range(dropped, k - 1):
@@ -138,7 +138,7 @@ def drop(basis: Basis, k: int, dropped: int) -> int:
 
 
 @compiled
-def combination(basis: Basis, k: int, d: Array, r: Array) -> None:
+def combination(basis: ActiveNormals, k: int, d: Array, r: Array) -> None:
     """Solve R r = d: the coefficients of the combination of members with coordinates d in Q."""
     for i in range(k - 1, -1, -1):
         x = d[i]
@@ -148,7 +148,7 @@ def combination(basis: Basis, k: int, d: Array, r: Array) -> None:
 
 
 @compiled
-def nearest(basis: Basis, k: int, ends: Array, target: Array, parts: Array, y: Array) -> None:
+def nearest(basis: ActiveNormals, k: int, ends: Array, target: Array, parts: Array, y: Array) -> None:
     """The nearest y = target + Σ parts[i] Q[i] with n_i . y = ends[i] for all members; ends becomes Q y."""
     copied(target, y)
     for i in range(k):  # Rᵀ z = b
@@ -169,7 +169,13 @@ def nearest(basis: Basis, k: int, ends: Array, target: Array, parts: Array, y: A
 
 @compiled
 def settle(
-    rows: Rows, basis: Basis, k: int, scale: float, target: Array, multipliers: Array, y: Array
+    rows: ConstraintRows,
+    basis: ActiveNormals,
+    k: int,
+    scale: float,
+    target: Array,
+    multipliers: Array,
+    y: Array,
 ) -> int:
     """The y nearest to the target with all members at equality, and their multipliers; members of the wrong
     sign are dropped. Returns the number left."""
@@ -189,7 +195,7 @@ def settle(
 
 
 @compiled
-def most_violated(rows: Rows, scale: float, y: Array, tolerance: float) -> int:
+def most_violated(rows: ConstraintRows, scale: float, y: Array, tolerance: float) -> int:
     """The member whose bound is violated by the greatest length; 0 for none beyond rounding."""
     c, member, worst = rows.G.shape[0], 0, 0.0
     for i in range(c):
@@ -205,7 +211,9 @@ def most_violated(rows: Rows, scale: float, y: Array, tolerance: float) -> int:
 
 
 @compiled
-def unexplained(rows: Rows, basis: Basis, k: int, member: int, r: Array) -> tuple[float, float, float]:
+def unexplained(
+    rows: ConstraintRows, basis: ActiveNormals, k: int, member: int, r: Array
+) -> tuple[float, float, float]:
     """(b0, b1) of a row less the members' by the combination r, and the size of the terms of b1."""
     b0, b1 = bound(rows, member)
     size = abs(b1)
@@ -218,7 +226,7 @@ def unexplained(rows: Rows, basis: Basis, k: int, member: int, r: Array) -> tupl
 
 
 @compiled
-def first_to_leave(basis: Basis, k: int, multipliers: Array, r: Array) -> tuple[float, int]:
+def first_to_leave(basis: ActiveNormals, k: int, multipliers: Array, r: Array) -> tuple[float, int]:
     """The step along -r at which the first multiplier of a row of G is 0, and its number; -1 for none."""
     step, first = math.inf, -1
     for i in range(k):
@@ -230,14 +238,14 @@ def first_to_leave(basis: Basis, k: int, multipliers: Array, r: Array) -> tuple[
 
 
 @compiled
-def nearest_within(rows: Rows, target: Array, least: float, active: Integers, y: Array) -> float:
+def nearest_within(rows: ConstraintRows, target: Array, least: float, active: Integers, y: Array) -> float:
     """Write y (m,) for the largest λ in [least, 1] and return λ, NaN if there is none (y is then arbitrary).
 
     active (2 + c,) : the number of active rows of G, and these, kept between calls; last the row that cut λ,
         which cuts it at once in the next call. Reset to [0, ...] where there is no λ
     """
     c, m = rows.G.shape
-    basis = Basis(scratch((m, m)), scratch((m, m)), integer_scratch(m), scratch(m), scratch(m))
+    basis = ActiveNormals(scratch((m, m)), scratch((m, m)), integer_scratch(m), scratch(m), scratch(m))
     multipliers, r, n = scratch(m), scratch(m), scratch(m)
     scale, k, e, cutting = 1.0, 0, rows.E.shape[0], 0
     clear(multipliers)

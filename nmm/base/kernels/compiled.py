@@ -25,7 +25,7 @@ import numpy as np
 
 from nmm.base.kernels.cache import works_marker
 from nmm.base.kernels.declared import declare
-from nmm.base.kernels.entries import PLAIN_OPTIONS, Entry, Options, entry
+from nmm.base.kernels.entries import PLAIN_OPTIONS, CompileOptions, Entry, entry
 from nmm.base.kernels.signatures import (
     Array,
     RecordPlace,
@@ -204,7 +204,9 @@ class Compiled:
     entries : what has been compiled or read, by the arguments' types
     """
 
-    def __init__(self, function: Plain, inlined: bool = False, options: Options = PLAIN_OPTIONS) -> None:
+    def __init__(
+        self, function: Plain, inlined: bool = False, options: CompileOptions = PLAIN_OPTIONS
+    ) -> None:
         functools.update_wrapper(self, function)
         self.py_func = function
         self._options = options
@@ -241,7 +243,7 @@ def compiled(
         return function
     if problem() is not None:
         return _by_numba("compiled_by_numba")(function, nogil)
-    return Compiled(function, inlined, Options(nogil, vectorized))
+    return Compiled(function, inlined, CompileOptions(nogil, vectorized))
 
 
 @functools.cache

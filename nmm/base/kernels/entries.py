@@ -15,7 +15,7 @@ from nmm.base.kernels.signatures import Type
 from nmm.base.lazy_call import lazy_call
 
 
-class Options(NamedTuple):
+class CompileOptions(NamedTuple):
     """nogil : whether other threads run meanwhile; vectorized : whether loops are; cached : on disk"""
 
     nogil: bool = False
@@ -23,7 +23,7 @@ class Options(NamedTuple):
     cached: bool = True
 
 
-PLAIN_OPTIONS, UNCACHED = Options(), Options(cached=False)
+PLAIN_OPTIONS, UNCACHED = CompileOptions(), CompileOptions(cached=False)
 
 
 class Entry(NamedTuple):
@@ -39,7 +39,7 @@ class Entry(NamedTuple):
     read: bool
 
 
-def entry(function: Any, arguments: tuple[Type, ...], options: Options) -> Entry:
+def entry(function: Any, arguments: tuple[Type, ...], options: CompileOptions) -> Entry:
     """A function's machine code for these types of arguments, from the cache or compiled."""
     key = key_of(function, arguments, options) if options.cached else None
     path = None if key is None else file_of(function, key)

@@ -48,7 +48,7 @@ class Type:
         return Array(self, len(axes), "C" if axes[-1].step == 1 else "A")
 
 
-class Number(Type):
+class NumberType(Type):
     """A number, a truth value, or none: name is numba's."""
 
     def _describe(self, name: str) -> None:
@@ -56,7 +56,7 @@ class Number(Type):
 
 
 class Array(Type):
-    """dtype : a `Number`; ndim; layout : C or F for contiguous arrays, else A; mutable"""
+    """dtype : a `NumberType`; ndim; layout : C or F for contiguous arrays, else A; mutable"""
 
     dtype: Type
     ndim: int
@@ -112,7 +112,7 @@ class Signature(NamedTuple):
         return f"({', '.join(map(str, self.args))}) -> {self.return_type}"
 
 
-float64, int64, boolean, void = map(Number, ("float64", "int64", "bool", "none"))
+float64, int64, boolean, void = map(NumberType, ("float64", "int64", "bool", "none"))
 
 
 def signature_of(signature: Any) -> Signature:

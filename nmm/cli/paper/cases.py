@@ -37,7 +37,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Row:
+class CaseRow:
     """A row of a case's table: name, unit, and values with RG and PG as text."""
 
     name: str
@@ -47,7 +47,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Claim:
+class PaperClaim:
     """A statement about a case, its source, the result, and whether they agree."""
 
     statement: str
@@ -61,8 +61,8 @@ class CaseResult:
     """A case's results as plain data for other processes: numbers, each run's samples, durations, s."""
 
     number: int
-    rows: tuple[Row, ...]
-    claims: tuple[Claim, ...]
+    rows: tuple[CaseRow, ...]
+    claims: tuple[PaperClaim, ...]
     samples: int
     seconds: float
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from nmm.base.arrays import Array
 from nmm.base.text_format import number_text
-from nmm.cli.paper.cases import Case, Claim, Row
+from nmm.cli.paper.cases import Case, CaseRow, PaperClaim
 
 if TYPE_CHECKING:
     from nmm.control.controller import Controller
@@ -64,14 +64,14 @@ def smallest_determinant(trajectory: Trajectory, controller: Controller) -> floa
     return float(np.abs(np.linalg.det(blocks)).min())
 
 
-def table(rg: Trajectory, pg: Trajectory, determinant: float | None) -> list[Row]:
+def table(rg: Trajectory, pg: Trajectory, determinant: float | None) -> list[CaseRow]:
     summaries = rg.summary(), pg.summary()
 
-    def row(name: str, unit: str, number: Callable[[Trajectory], float | None], digits: int = 3) -> Row:
-        return Row(name, unit, *(number_text(number(run), digits) for run in (rg, pg)))
+    def row(name: str, unit: str, number: Callable[[Trajectory], float | None], digits: int = 3) -> CaseRow:
+        return CaseRow(name, unit, *(number_text(number(run), digits) for run in (rg, pg)))
 
-    def read_row(name: str, unit: str, key: str, digits: int = 3) -> Row:
-        return Row(name, unit, *(number_text(numbers[key], digits) for numbers in summaries))
+    def read_row(name: str, unit: str, key: str, digits: int = 3) -> CaseRow:
+        return CaseRow(name, unit, *(number_text(numbers[key], digits) for numbers in summaries))
 
     units = ", ".join(dict.fromkeys(rg.r_units))
     decays = (f"{decay_rate(run.t, run.error_norm, 1e-9):.5f}" for run in (rg, pg))
@@ -79,7 +79,7 @@ def table(rg: Trajectory, pg: Trajectory, determinant: float | None) -> list[Row
         read_row("‖e‖ at the start", units, "error_initial", 4),
         read_row("‖e‖ at the end", units, "error_final"),
         row("largest |e(t) − e(0) exp(−K t)|", units, decay_deviation),
-        Row("fitted rate of decay of ‖e‖", "1/s", *decays),
+        CaseRow("fitted rate of decay of ‖e‖", "1/s", *decays),
         read_row("H at the start", "1", "objective_initial", 4),
         row("H below 10 % of that for good after", "s", lambda run: settling_time(run, 0.1)),
         row("H below 1 % of that for good after", "s", lambda run: settling_time(run, 0.01)),
@@ -88,8 +88,8 @@ def table(rg: Trajectory, pg: Trajectory, determinant: float | None) -> list[Row
         read_row("largest H in the second half", "1", "objective_max_second_half"),
         row("ripple (largest less smallest H) there", "1", ripple),
         read_row("smallest singular value of J̄", "mixed", "sigma_min"),
-        Row("smallest |det Ja|", "mixed", number_text(determinant), "–"),
-        Row("switches of partition", "1", str(rg.switches), "–"),
+        CaseRow("smallest |det Ja|", "mixed", number_text(determinant), "–"),
+        CaseRow("switches of partition", "1", str(rg.switches), "–"),
         row("smallest θ", "rad", lambda run: float(run.q[:, 2].min())),
         row("largest θ", "rad", lambda run: float(run.q[:, 2].max()), 4),
         read_row("largest ‖J̄ u − rate‖", "mixed", "residual_max", 2),
@@ -97,11 +97,11 @@ def table(rg: Trajectory, pg: Trajectory, determinant: float | None) -> list[Row
     ]
     for name, unit in zip(rg.robot.u_names, rg.robot.u_units, strict=True):
         sizes = (number_text(numbers["u_max"][name]) for numbers in summaries)
-        rows.append(Row(f"largest |{input_symbol(name)}|", unit, *sizes))
+        rows.append(CaseRow(f"largest |{input_symbol(name)}|", unit, *sizes))
     return rows
 
 
-def claims(case: Case, rg: Trajectory, pg: Trajectory, determinant: float | None) -> list[Claim]:
+def claims(case: Case, rg: Trajectory, pg: Trajectory, determinant: float | None) -> list[PaperClaim]:
     special = {1: _first, 2: _second, 3: _third, 4: _fourth}[case.number]
     return [_tracking(rg, pg), *special(rg, pg, determinant or 0.0), _steady_state(rg, pg)]
 
@@ -111,10 +111,10 @@ def _both(numbers: Sequence[float | None]) -> str:
     return ", ".join(f"{number_text(x)} ({who})" for x, who in zip(numbers, ("RG", "PG"), strict=True))
 
 
-def _tracking(rg: Trajectory, pg: Trajectory) -> Claim:
+def _tracking(rg: Trajectory, pg: Trajectory) -> PaperClaim:
     rates = [decay_rate(run.t, run.error_norm, 1e-9) for run in (rg, pg)]
     deviations = [decay_deviation(run) for run in (rg, pg)]
-    return Claim(
+    return PaperClaim(
         "The feedback recovers the initial task error exponentially, here with K = 1.",
         "section III",
         f"Rate fitted to ‖e‖: {rates[0]:.5f} 1/s (RG), {rates[1]:.5f} 1/s (PG). No component leaves "
@@ -124,9 +124,9 @@ def _tracking(rg: Trajectory, pg: Trajectory) -> Claim:
     )
 
 
-def _steady_state(rg: Trajectory, pg: Trajectory) -> Claim:
+def _steady_state(rg: Trajectory, pg: Trajectory) -> PaperClaim:
     means = [run.summary()["objective_mean_second_half"] for run in (rg, pg)]
-    return Claim(
+    return PaperClaim(
         "RG optimises better than PG.",
         "section VII",
         f"Mean H in the second half of the run: {_both(means)}.",
@@ -134,9 +134,9 @@ def _steady_state(rg: Trajectory, pg: Trajectory) -> Claim:
     )
 
 
-def _faster(rg: Trajectory, pg: Trajectory, statement: str, source: str) -> Claim:
+def _faster(rg: Trajectory, pg: Trajectory, statement: str, source: str) -> PaperClaim:
     times, text = _settling(rg, pg, 0.01)
-    return Claim(
+    return PaperClaim(
         statement,
         source,
         f"H stays below 1 % of H(0) after {text}; below 0.1 % after {_settling(rg, pg, 0.001)[1]}.",
@@ -151,9 +151,9 @@ def _settling(rg: Trajectory, pg: Trajectory, fraction: float) -> tuple[list[flo
     return times, f"{texts[0]} (RG), {texts[1]} (PG)"
 
 
-def _switching(rg: Trajectory, determinant: float, statement: str, source: str) -> Claim:
+def _switching(rg: Trajectory, determinant: float, statement: str, source: str) -> PaperClaim:
     names = ", ".join(input_symbol(rg.robot.u_names[column]) for column in rg.partition[0])
-    return Claim(
+    return PaperClaim(
         statement,
         source,
         f"The rule is in place and this motion needs no switch: Ja of {names} throughout, "
@@ -164,12 +164,12 @@ def _switching(rg: Trajectory, determinant: float, statement: str, source: str) 
     )
 
 
-def _first(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
+def _first(rg: Trajectory, pg: Trajectory, determinant: float) -> list[PaperClaim]:
     forward = np.flatnonzero(rg.u[:, 0] >= 0.0)
     backwards = float(rg.t[forward[0]] if forward.size else rg.t[-1])
     ripples = [ripple(run) for run in (rg, pg)]
     return [
-        Claim(
+        PaperClaim(
             "Tracking is good despite the initial backup of the platform.",
             "Fig. 3",
             f"v(0) = {number_text(float(rg.u[0, 0]))} m/s; "
@@ -177,7 +177,7 @@ def _first(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
             float(rg.u[0, 0]) < 0.0 < backwards,
         ),
         _faster(rg, pg, "RG is faster in approaching the minimum of H₁.", "Fig. 4"),
-        Claim(
+        PaperClaim(
             "RG keeps a lower ripple in steady state.",
             "Fig. 4",
             f"Ripple in the second half of the run: {_both(ripples)}.",
@@ -189,7 +189,7 @@ def _first(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
     ]
 
 
-def _second(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
+def _second(rg: Trajectory, pg: Trajectory, determinant: float) -> list[PaperClaim]:
     rate = decay_rate(rg.t, rg.objective, 1e-9)
     exact = rg.objective[0] * np.exp(-2.0 * ALPHA * rg.t)
     deviation = float(np.abs(rg.objective - exact).max())
@@ -197,27 +197,27 @@ def _second(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
     steady = outside[rg.t > 3.0]
     largest = [run.summary()["objective_max_second_half"] for run in (rg, pg)]
     return [
-        Claim(
+        PaperClaim(
             "No switching is needed: the minor Δ₁₂₃ = d never vanishes.",
             "VI-2",
             f"Ja = [j₁ j₂ j₃] throughout; |det Ja| is at least {determinant:.6f} m, and d = 0.3 m.",
             rg.switches == 0 and abs(determinant - 0.3) < 1e-12,
         ),
         _faster(rg, pg, "RG reaches the minimum of H₂ faster …", "Fig. 6"),
-        Claim(
+        PaperClaim(
             "… and firmly keeps its absolute minimum.",
             "Fig. 6",
             f"Largest H₂ in the second half of the run: {number_text(largest[0], 2)} (RG, rounding), "
             f"{number_text(largest[1], 2)} (PG).",
             largest[0] < 1e-20 < largest[1],
         ),
-        Claim(
+        PaperClaim(
             "With RG, H₂(t) = H₂(0) exp(−2 α t).",
             "follows from eq. (10)",
             f"Fitted rate {rate:.6f} 1/s, where 2 α = 20 1/s; largest deviation {number_text(deviation, 2)}.",
             abs(rate - 2.0 * ALPHA) < 1e-4 and deviation < 1e-6,
         ),
-        Claim(
+        PaperClaim(
             "The platform waves around the nominal trajectory of the end-effector.",
             "Fig. 5",
             f"After 3 s it is up to {number_text(float(-steady.min()), 2)} m inside "
@@ -227,11 +227,11 @@ def _second(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
     ]
 
 
-def _third(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
+def _third(rg: Trajectory, pg: Trajectory, determinant: float) -> list[PaperClaim]:
     early = float(np.abs(rg.u[rg.t <= 1.0]).max())
     late = float(np.abs(rg.u[rg.t > 2.0]).max())
     return [
-        Claim(
+        PaperClaim(
             "RG is built on the always nonsingular block Ja = [j₁ j₂ j₃].",
             "VI-3, corrected",
             "The printed minor, Δ₁₂₃ = d, is that of J; the method inverts the block of J̄, whose minor "
@@ -239,14 +239,14 @@ def _third(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
             rg.switches == 0 and determinant > 0.23,
         ),
         _faster(rg, pg, "RG approaches the minimum of H₃ faster.", "VII, Fig. 8"),
-        Claim(
+        PaperClaim(
             "Tracking takes a complex reconfiguration only in the initial instants.",
             "Fig. 7",
             f"Largest input {number_text(early)} m/s or rad/s in the first second, "
             f"{number_text(late)} after 2 s.",
             late < 0.1 * early,
         ),
-        Claim(
+        PaperClaim(
             "H₃ reads θ as it is, which leaves (−π, π] and passes 11 rad: it must not be wrapped.",
             "follows from H₃",
             f"θ goes from {number_text(float(rg.q[0, 2]), 4)} rad "
@@ -256,10 +256,10 @@ def _third(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
     ]
 
 
-def _fourth(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
+def _fourth(rg: Trajectory, pg: Trajectory, determinant: float) -> list[PaperClaim]:
     times, text = _settling(rg, pg, 0.01)
     return [
-        Claim(
+        PaperClaim(
             "Both methods recover the optimal value of H₄ fast.",
             "Fig. 10",
             f"H₄ stays below 1 % of H₄(0) after {text}.",

@@ -15,7 +15,7 @@ from nmm.base.figure_options import PLAIN, FigureOptions
 from nmm.base.processes import share_out
 from nmm.base.progress import Progress, between
 from nmm.base.templates import template
-from nmm.cli.paper.cases import CASES, DT, RESOLVERS, Case, CaseResult, Claim
+from nmm.cli.paper.cases import CASES, DT, RESOLVERS, Case, CaseResult, PaperClaim
 from nmm.cli.paper.claims import claims, smallest_determinant, table
 from nmm.motion.trajectory import Outcome, Trajectory
 from nmm.views.folders.whole import FolderKind, replaced_folder
@@ -37,7 +37,7 @@ class PaperReport:
     seconds: float
 
     @property
-    def claims(self) -> tuple[Claim, ...]:
+    def claims(self) -> tuple[PaperClaim, ...]:
         """The claims of all cases, in order."""
         return tuple(claim for case in self.cases for claim in case.claims)
 

@@ -28,7 +28,7 @@ from nmm.base.kernels.record_layout import (
     Vector,
 )
 from nmm.control.resolvers.problem_arrays import LOWER, UPPER, ProblemArrays
-from nmm.model.collisions.rows import Rows
+from nmm.model.collisions.rows import DistanceRows
 from nmm.model.robots.wheel_rates import rolling
 
 #: `LimitNumbers.mode`: a step at a sample, at an integrator's stage after it, or without limits.
@@ -191,7 +191,7 @@ def function_bounds(limits: LimitNumbers, value: Array, value_t: Array, problem:
         problem.lower[w + i] = -approach(value[row] - limits.row_low[i], dt, below, recovery) - value_t[row]
 
 
-class Clearance(NamedTuple):
+class DistanceDamper(NamedTuple):
     """How distances are kept.
 
     first () : the first of their rows among those of the limits
@@ -226,7 +226,9 @@ def bound_unlimited(limits: LimitNumbers, problem: ProblemArrays) -> None:
 
 
 @compiled
-def clearance_bounds(keep: Clearance, near: Rows, limits: LimitNumbers, problem: ProblemArrays) -> None:
+def clearance_bounds(
+    keep: DistanceDamper, near: DistanceRows, limits: LimitNumbers, problem: ProblemArrays
+) -> None:
     dt = problem.dt[()]
     for k in range(near.d.shape[0]):
         row = keep.first[()] + k

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from nmm.base.arrays import Array, Integers
-from nmm.base.kernels.active_set import DEPENDENT, Basis, combination, join, nearest, split
+from nmm.base.kernels.active_set import DEPENDENT, ActiveNormals, combination, join, nearest, split
 from nmm.base.kernels.compiled import clear, compiled, integer_scratch, scratch
 from nmm.base.kernels.damping import CONSTANT, Law, damped_solution
 from nmm.base.kernels.linear_algebra import add, copied, dot, norm, project_out, times, times_matrix
@@ -138,7 +138,7 @@ def damp_between_stops(
     held, left = integer_scratch(stops), integer_scratch(stops)
     for i in range(stops):
         held[i], left[i] = 0, 0
-    basis = Basis(scratch((m, m)), scratch((m, m)), integer_scratch(m), scratch(m), scratch(m))
+    basis = ActiveNormals(scratch((m, m)), scratch((m, m)), integer_scratch(m), scratch(m), scratch(m))
     falls, multipliers, n = scratch(m), scratch(m), scratch(m)
     k, damping = 0, (0.0, False)
     cost = law.damping * law.damping if law.mode == CONSTANT else 0.0
@@ -185,7 +185,7 @@ def outwards(G: Array, i: int, side: int, n: Array) -> float:
 
 
 @compiled
-def hold(G: Array, held: Integers, basis: Basis, n: Array) -> int:
+def hold(G: Array, held: Integers, basis: ActiveNormals, n: Array) -> int:
     """Make the held stops the members of the basis; returns their number."""
     k = 0
     for i in range(held.shape[0]):
@@ -202,7 +202,7 @@ def between(
     u0: Array,
     G: Array,
     held: Integers,
-    basis: Basis,
+    basis: ActiveNormals,
     used: int,
     law: Law,
     dt: float,
@@ -246,7 +246,7 @@ def farthest_passed(problem: ProblemArrays, G: Array, solution: Array, held: Int
 
 
 @compiled
-def in_the_way(basis: Basis, k: int, shares: Array, multipliers: Array) -> int:
+def in_the_way(basis: ActiveNormals, k: int, shares: Array, multipliers: Array) -> int:
     """The held stop to release so that another one can be held; -1 for none. With the other's row Σ r_i n_i,
     r the shares, it is the stop with r_i > 0 whose multiplier (`keeps_back`) reaches 0 first."""
     blocking, least = -1, math.inf
@@ -272,7 +272,7 @@ def fall(problem: ProblemArrays, J: Array, solution: Array, u0: Array, cost: flo
 
 
 @compiled
-def keeps_back(basis: Basis, k: int, multipliers: Array, left: Integers, least: float) -> int:
+def keeps_back(basis: ActiveNormals, k: int, multipliers: Array, left: Integers, least: float) -> int:
     """The stop whose release helps the task most, and more than `least`; -1 for none.
 
     The task's error plus the cost of damping falls along `falls` = Jᵀ r - λ² (u - u0), of which Σ ν_i n_i is

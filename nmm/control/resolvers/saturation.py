@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from nmm.base.arrays import Array
-from nmm.base.kernels.active_set import Rows, nearest_within
+from nmm.base.kernels.active_set import ConstraintRows, nearest_within
 from nmm.base.kernels.compiled import clear, compiled, integer_scratch, kernel, scratch, view
 from nmm.base.kernels.linear_algebra import copied, dot, norm, residual_norm, solve, times, times_matrix
 from nmm.control.resolvers.answer import (
@@ -56,7 +56,7 @@ def nearest_allowed(problem: ProblemArrays, wanted: Array, u: Array) -> float:
     E, none, y = scratch((0, m)), scratch(0), scratch(m)
     active = integer_scratch(2 + c)
     active[0] = 0
-    scale = nearest_within(Rows(E, none, none, G, lower, upper, give), wanted, -math.inf, active, y)
+    scale = nearest_within(ConstraintRows(E, none, none, G, lower, upper, give), wanted, -math.inf, active, y)
     if math.isnan(scale):
         return math.inf
     for j in range(m):
@@ -125,7 +125,7 @@ def enforce_limits(problem: ProblemArrays, T: Array, answer: AnswerArrays) -> No
         for i in range(end):
             change[i] = dot(JT[i], target) if i >= first else 0.0
         from_rest(problem, low, high, rest, lower, upper)
-        rows = Rows(
+        rows = ConstraintRows(
             view(JT, 0, (end, m)), view(fixed, 0, (end,)), view(change, 0, (end,)), G, lower, upper, give
         )
         active = view(problem.active, level * (2 + c), (2 + c,))
@@ -158,7 +158,7 @@ def shortest(problem: ProblemArrays, end: int, other: Array, u: Array) -> None:
     times(problem.J, other, rates)
     active = integer_scratch(2)
     active[0] = 0
-    rows = Rows(view(problem.J, 0, (end, m)), nothing, rates, scratch((0, m)), none, none, none)
+    rows = ConstraintRows(view(problem.J, 0, (end, m)), nothing, rates, scratch((0, m)), none, none, none)
     nearest_within(rows, target, 0.0, active, u)
 
 
@@ -219,7 +219,7 @@ def keep_if_possible(
     clear(still)
     plain, G = scratch((0, 0)), scratch((c, m))
     rows_of_limits(problem, plain, G)
-    rows = Rows(view(problem.J, 0, (first, m)), nothing, nothing, G, lower, upper, give)
+    rows = ConstraintRows(view(problem.J, 0, (first, m)), nothing, nothing, G, lower, upper, give)
     widened = 1.0 - nearest_within(rows, still, -math.inf, active, difference)
     if not math.isnan(widened):
         move(problem, plain, rest, difference, moved)

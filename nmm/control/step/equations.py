@@ -22,7 +22,7 @@ from nmm.base.kernels.record_layout import (
 from nmm.base.kernels.signatures import boolean, float64, int64, void
 from nmm.base.kernels.velocity_map import to_coordinates, to_inputs
 from nmm.control.functions.program import BESIDE, Buffers, LaidOut, run_program
-from nmm.control.limits.bounds import SAMPLE, Clearance, LimitNumbers, gathers_speed
+from nmm.control.limits.bounds import SAMPLE, DistanceDamper, LimitNumbers, gathers_speed
 from nmm.control.period_monitor import PeriodNumbers
 from nmm.control.resolvers.answer import NOT_FINITE, RELAXED, SINGULAR_J, SOLVED, AnswerArrays
 from nmm.control.resolvers.base import call_resolver
@@ -32,7 +32,7 @@ from nmm.control.resolvers.saturation import replace_by_nearest
 from nmm.control.retreat import RetreatNumbers, stalls
 from nmm.control.steering import SteeringNumbers, steer
 from nmm.control.step.step_records import SecondOrder, TaskRows
-from nmm.model.collisions.rows import Rows
+from nmm.model.collisions.rows import DistanceRows
 
 
 class Arm(NamedTuple):
@@ -69,8 +69,8 @@ class ControlStep(NamedTuple):
     limits_code, clearance_code : addresses of `write_limits` and `write_clearance`; 0 where not used
     """
 
-    near: Rows
-    clearance: Clearance
+    near: DistanceRows
+    clearance: DistanceDamper
     task: TaskRows
     added: TaskRows
     arm: Arm

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array
-from nmm.control.functions.objectives.base import Product
+from nmm.control.functions.objectives.base import WeightedFunction
 from nmm.control.functions.program import evaluate
 from nmm.control.step.step_solver import StepSolver
 from nmm.model.robots.configuration import Configuration
@@ -52,7 +52,7 @@ def _derivatives(solver: StepSolver, q: Array) -> Sequence[Array]:
     J, added_J, h = solver.derivatives
     whole = []
     for _, term in () if objective is None else objective.terms():
-        if isinstance(term, Product):
+        if isinstance(term, WeightedFunction):
             configuration = Configuration(robot, q)
             whole.append(evaluate(term.function, 0.0, configuration).value_q @ configuration.S)
     return J, added_J[: len(solver.added_task.rows(robot))], h, *whole

@@ -11,7 +11,7 @@ from nmm.control.functions.function import Function, row_scales
 from nmm.control.functions.objectives.base import Objective
 from nmm.control.functions.program import BESIDE, COMPILED, PINOCCHIO, Buffers, Program
 from nmm.control.functions.tasks.task import Stack
-from nmm.control.limits.bounds import Clearance
+from nmm.control.limits.bounds import DistanceDamper
 from nmm.control.limits.collisions import Collisions
 from nmm.control.limits.limits import Limits, LimitsOn
 from nmm.control.period_monitor import NOT_CALLED
@@ -250,9 +250,9 @@ def _first() -> SecondOrder:
     return SecondOrder(cell, cell, cell, 0, buffers, rows, rows, none, y, *(none for _ in range(5)))
 
 
-def _clearance(collisions: Collisions | None, first: int, count: int) -> Clearance:
+def _clearance(collisions: Collisions | None, first: int, count: int) -> DistanceDamper:
     settings = Collisions() if collisions is None else collisions
-    return Clearance(
+    return DistanceDamper(
         first=np.array(first, dtype=np.int64),
         distance=np.array(settings.distance),
         margin=np.array(MARGIN),

@@ -18,7 +18,7 @@ from nmm.base.kernels.signatures import float64, int64, void
 from nmm.model.collisions.broad_phase import PairArrays, find_near
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.collisions.pairs import pairs_of
-from nmm.model.collisions.rows import Rows, write_row, write_rows
+from nmm.model.collisions.rows import DistanceRows, write_row, write_rows
 from nmm.model.robots.joint_table import placement_rows
 from nmm.model.robots.robot import Robot
 
@@ -33,7 +33,7 @@ _ROWS = float64(BLOCKS, _STRIDED, _STRIDED, _STRIDED, BLOCKS, int64)
 @compiled
 def _row(blocks: Blocks, places: Array, J: Array, row_blocks: Blocks, place: int, slot: int) -> None:
     scene = views(PairArrays, blocks.integers, blocks.floats, 0)
-    write_row(scene, J, places, views(Rows, row_blocks.integers, row_blocks.floats, place), slot)
+    write_row(scene, J, places, views(DistanceRows, row_blocks.integers, row_blocks.floats, place), slot)
 
 
 class Queries:
@@ -119,13 +119,13 @@ class Queries:
                 geometry_data.deactivateCollisionPair(k)
 
     def update(self, t: float, q: Array, integers: Integers, floats: Array, place: int) -> None:
-        """Measure, and write the rows of near pairs where a record `Rows` lies in the blocks."""
+        """Measure, and write the rows of near pairs where `DistanceRows` lies in the blocks."""
         self.measure(t, q)
         self._where = Blocks(integers, floats), place
         self.least = self._rows(self.blocks, self.results, self.places, self.J, *self._where)
 
     def carry(
-        self, pair: int, now: tuple[float, Array], later: tuple[float, Array], rows: Rows, slot: int
+        self, pair: int, now: tuple[float, Array], later: tuple[float, Array], rows: DistanceRows, slot: int
     ) -> None:
         """Write a row of the last `update`: a pair's points nearest at `later`, (t, q), placed at `now`."""
         self.distances(*later, [pair])

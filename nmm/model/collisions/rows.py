@@ -36,7 +36,7 @@ DIRECTIONS = np.array(
 CORNERS = 16
 
 
-class Rows(NamedTuple):
+class DistanceRows(NamedTuple):
     """K rows of distances, of which `used` () are; at most `most` () of them are written here.
 
     pair (K,) : its number; d (K,), m; d_q (K, n); d_t (K,), m/s
@@ -53,7 +53,7 @@ class Rows(NamedTuple):
 
 
 @compiled
-def write_row(scene: PairArrays, J: Array, places: Array, rows: Rows, slot: int) -> None:
+def write_row(scene: PairArrays, J: Array, places: Array, rows: DistanceRows, slot: int) -> None:
     """d, d_q and d_t of a row whose pair and points are there; J (n, 6) : twists about the world's origin."""
     i, j = scene.pairs[rows.pair[slot], 0], scene.pairs[rows.pair[slot], 1]
     x = rows.points[slot]
@@ -124,7 +124,7 @@ def write_rows(
 ) -> float:
     """Write the rows of near pairs; returns their least distance, or infinity."""
     scene = views(PairArrays, blocks.integers, blocks.floats, 0)
-    rows = views(Rows, row_blocks.integers, row_blocks.floats, place)
+    rows = views(DistanceRows, row_blocks.integers, row_blocks.floats, place)
     most = rows.most[()]
     used = 0
     least = math.inf
@@ -215,7 +215,7 @@ def facing(
 
 
 @compiled
-def add_faces(scene: PairArrays, places: Array, J: Array, rows: Rows, slot: int, used: int) -> int:
+def add_faces(scene: PairArrays, places: Array, J: Array, rows: DistanceRows, slot: int, used: int) -> int:
     """Add rows at the ends of the common part of two faces or edges; returns the number of rows then."""
     pair = rows.pair[slot]
     i, j = scene.pairs[pair, 0], scene.pairs[pair, 1]
@@ -277,10 +277,10 @@ def add_faces(scene: PairArrays, places: Array, J: Array, rows: Rows, slot: int,
     return used
 
 
-def no_rows(n: int, most: int = 0, more: int = 0) -> Rows:
+def no_rows(n: int, most: int = 0, more: int = 0) -> DistanceRows:
     """Room for `most` rows on n coordinates, and for `more` beside them."""
     K = most + more
-    return Rows(
+    return DistanceRows(
         used=np.array(0, dtype=np.int64),
         most=np.array(most, dtype=np.int64),
         pair=np.zeros(K, dtype=np.int64),

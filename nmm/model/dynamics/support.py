@@ -7,7 +7,7 @@ import pinocchio as pin
 
 from nmm.base.arrays import Array
 from nmm.base.convex_hull import convex_corners
-from nmm.model.robots.loading.ground import Ground
+from nmm.model.robots.loading.ground import GroundContacts
 from nmm.model.robots.robot import Robot
 
 
@@ -25,7 +25,7 @@ class Support:
     """
 
     def __init__(self, robot: Robot) -> None:
-        ground = Ground.of(robot)
+        ground = GroundContacts.of(robot)
         self.robot, self.height = robot, 0.0 if ground is None else ground.z
         known = len(robot.wheels) >= 3 and robot.platform.n_p >= 3 and _main_mass(robot) > 0.0
         self._wheels = robot.wheels if known else ()

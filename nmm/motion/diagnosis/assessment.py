@@ -23,7 +23,7 @@ from nmm.control.step.equations import ControlStep, call_step
 from nmm.motion.diagnosis.error_bound import (
     ENDS,
     Departure,
-    Samples,
+    TaskSamples,
     adaptive_errors,
     decay,
     departure,
@@ -168,7 +168,7 @@ def assess(
         unstable = instabilities(controller, recorder.t[some], recorder.q[some], dt, advance.stability)
         if len(recorder) < 3 or not held:
             return Assessment(unstable, len(some), None, 0)
-        samples = Samples.of(recorder)
+        samples = TaskSamples.of(recorder)
         if advance.tolerance:
             steps = adaptive_errors(samples, recorder.so_far.q, advance.tolerance)
         else:
@@ -181,7 +181,7 @@ def assess(
         return Assessment(unstable, len(some), departed, own)
 
 
-def _own_moves(samples: Samples, moved: Array) -> int:
+def _own_moves(samples: TaskSamples, moved: Array) -> int:
     """The number of steps in which the target moved significantly otherwise than its rate says; 0 if few.
     Smaller motions may be errors of `_target_moves`'s trapezoids, for any target that moves non-uniformly."""
     decays = decay(samples.t, samples.error, samples.feedback)
@@ -190,7 +190,7 @@ def _own_moves(samples: Samples, moved: Array) -> int:
     return own if own > OFTEN * len(moved) else 0
 
 
-def _target_moves(controller: Controller, samples: Samples, q: Array) -> Array:
+def _target_moves(controller: Controller, samples: TaskSamples, q: Array) -> Array:
     """Change of the error along each step with q held, beyond what its rate says, (N - 1,)."""
     error, rate = controller.solver.errors(samples.t[1:], q[:-1])
     controller.reset()

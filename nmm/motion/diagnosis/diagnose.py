@@ -12,7 +12,7 @@ from nmm.control.functions.function import row_scales
 from nmm.control.goal import Goal, error_sizes
 from nmm.control.sequencing.sequence import Schedule
 from nmm.motion.clearance import Swept
-from nmm.motion.diagnosis.judgement import Judged, judge
+from nmm.motion.diagnosis.judgement import LegJudgement, judge
 from nmm.motion.diagnosis.limits import (
     binding,
     broken_limits,
@@ -98,7 +98,9 @@ def diagnose_legs(
     return _when_read(judged, finish)
 
 
-def _when_read(judged: Sequence[Judged], finish: Callable[[Sequence[Verdict]], Verdict]) -> Verdict | Awaited:
+def _when_read(
+    judged: Sequence[LegJudgement], finish: Callable[[Sequence[Verdict]], Verdict]
+) -> Verdict | Awaited:
     """`finish` of the legs' verdicts; deferred if some need trials of another dt."""
     if not any(leg.trials for leg in judged):
         return finish([leg.verdict(None) for leg in judged])

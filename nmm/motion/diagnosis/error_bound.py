@@ -67,7 +67,7 @@ class Feedback(NamedTuple):
         return np.where(size > most, most / np.where(size > 0.0, size, 1.0), 1.0)
 
 
-class Samples(NamedTuple):
+class TaskSamples(NamedTuple):
     """A task at N samples: t, s; error and rate (N, s), ∂e/∂t + K e, asked of J u; J (N, s, m); u (N, m);
     residual ‖J u - rate‖; Ja's columns, -1 for none; feedback K e, as bounded."""
 
@@ -82,7 +82,7 @@ class Samples(NamedTuple):
     servo: float = 0.0
 
     @classmethod
-    def of(cls, recorder: Recorder) -> Samples:
+    def of(cls, recorder: Recorder) -> TaskSamples:
         """The samples recorded so far, with the rate of bounded feedback."""
         controller, recorded = recorder.controller, recorder.so_far
         feedback = Feedback(*gain_rows(controller.task, controller.robot))
@@ -124,7 +124,7 @@ class Departure(NamedTuple):
 
 
 def departure(
-    samples: Samples, step: Array, target: Array | None = None, *, goes_on: bool = False
+    samples: TaskSamples, step: Array, target: Array | None = None, *, goes_on: bool = False
 ) -> Departure | None:
     """Where and how far ‖e‖ exceeds its expected decay, if it does.
 
@@ -208,7 +208,7 @@ def _steps(t: Array) -> tuple[Array, Integers]:
     return np.unique(steps, return_inverse=True)
 
 
-def step_errors(samples: Samples, order: int) -> Array:
+def step_errors(samples: TaskSamples, order: int) -> Array:
     """The error that a method of that order may make along each step, (N - 1,); 0 for unresolved steps."""
     t, error, rate, J, u, _, partition, feedback, _ = samples
     fed, K, errors = feedback.rates(error), feedback.K, np.empty(len(t) - 1)
@@ -270,7 +270,7 @@ def changed(values: Array, k: int, size: int) -> tuple[float, float]:
     return apart, apart / larger if larger > 0.0 else apart
 
 
-def adaptive_errors(samples: Samples, q: Array, tolerance: float) -> Array:
+def adaptive_errors(samples: TaskSamples, q: Array, tolerance: float) -> Array:
     """Errors (N - 1,) of adaptive steps between samples at q (N, n), with a tolerance in m and rad."""
     moved = np.linalg.norm(samples.J[:-1], axis=(1, 2)) * (1.0 + np.abs(q[:-1]).max(axis=1))
     return np.asarray(SAFETY * tolerance * moved)

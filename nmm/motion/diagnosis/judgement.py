@@ -1,7 +1,7 @@
 """Judges a run, or a leg of one: its error against its expected decay, its inputs against the task.
 
 Examined at its end, as controller and targets may change later; only a shorter dt, which takes as long as
-several runs, is tried when the verdict is read (`Judged.trials`).
+several runs, is tried when the verdict is read (`LegJudgement.trials`).
 """
 
 import copy
@@ -19,7 +19,7 @@ from nmm.control.plant import Plant
 from nmm.model.robots.wheel_slip import sideways_speeds
 from nmm.motion.diagnosis import reasons
 from nmm.motion.diagnosis.assessment import Assessment, Instability, assess
-from nmm.motion.diagnosis.error_bound import Departure, Samples
+from nmm.motion.diagnosis.error_bound import Departure, TaskSamples
 from nmm.motion.diagnosis.jumps import chattering, crossings, moving_otherwise
 from nmm.motion.leg import Leg
 from nmm.motion.recorded_run import record_run, sample_times
@@ -129,7 +129,7 @@ def passed(recorder: Recorder) -> Finding | None:
 
 
 @dataclass(frozen=True)
-class Judged:
+class LegJudgement:
     """The judgement of a leg that ended, with outcome and reasons of its integration.
 
     lost : what nothing moves, at a singular end
@@ -198,7 +198,7 @@ class Judged:
         return (Finding("dt_too_long", values, {"t": mode.t}),)
 
 
-def judge(leg: Leg, dt: float, method: str, goal: Goal | None) -> Judged:
+def judge(leg: Leg, dt: float, method: str, goal: Goal | None) -> LegJudgement:
     """Judge a leg; one that reached its goal may be above its decay. An interrupt only loses findings."""
     ended = leg.ended
     try:
@@ -206,19 +206,19 @@ def judge(leg: Leg, dt: float, method: str, goal: Goal | None) -> Judged:
             return _judged(leg, dt, method, goal)
     except KeyboardInterrupt:
         if ended.outcome is Outcome.COMPLETED:
-            return Judged(Outcome.INTERRUPTED, (Finding("interrupted_judging"),))
-        return Judged(ended.outcome, ended.reasons)
+            return LegJudgement(Outcome.INTERRUPTED, (Finding("interrupted_judging"),))
+        return LegJudgement(ended.outcome, ended.reasons)
 
 
-def _judged(leg: Leg, dt: float, method: str, goal: Goal | None) -> Judged:
+def _judged(leg: Leg, dt: float, method: str, goal: Goal | None) -> LegJudgement:
     controller, recorder, (outcome, ended, _, _) = leg.controller, leg.recorder, leg.ended
     lost = tuple(_lost(leg))
     if not len(recorder):
-        return Judged(outcome, ended, lost=lost)
-    samples = Samples.of(recorder)
+        return LegJudgement(outcome, ended, lost=lost)
+    samples = TaskSamples.of(recorder)
     warnings = tuple((finding,) for finding in _unmet(controller, recorder, samples, dt))
     if outcome is Outcome.INTERRUPTED or recorder.disturbed:  # no decay is expected of a disturbed robot
-        return Judged(outcome, ended, warnings, lost)
+        return LegJudgement(outcome, ended, warnings, lost)
     at_goal = goal is not None and goal.reached(samples.error[-1], controller.rows)
     assessment = assess(controller, recorder, leg.integrator, dt, held=not at_goal)
     left = assessment.departure
@@ -232,7 +232,7 @@ def _judged(leg: Leg, dt: float, method: str, goal: Goal | None) -> Judged:
     # A task that distances hold back departs from its decay with any dt, and to try costs many runs.
     held_back = bool(recorder.blocking) or recorder.avoided
     hopeless = outcome is Outcome.SINGULAR or any(finding.code == HOPELESS for finding in seen)
-    return Judged(
+    return LegJudgement(
         outcome,
         ended,
         warnings,
@@ -249,7 +249,7 @@ def _judged(leg: Leg, dt: float, method: str, goal: Goal | None) -> Judged:
     )
 
 
-def _unmet(controller: Controller, recorder: Recorder, samples: Samples, dt: float) -> Iterator[Finding]:
+def _unmet(controller: Controller, recorder: Recorder, samples: TaskSamples, dt: float) -> Iterator[Finding]:
     """Findings where inputs fell short of the task, and where the motion differs from its recorded rates."""
     residual = samples.residual.copy()
     if controller.limits is not None:  # of a start from rest λ says it
@@ -275,7 +275,7 @@ def _unmet(controller: Controller, recorder: Recorder, samples: Samples, dt: flo
         yield Finding("wheels_slid", {"speeds": speeds}, {"t": float(samples.t[sliding[fastest][0]])})
 
 
-def _above_decay(samples: Samples, departure: Departure) -> Finding:
+def _above_decay(samples: TaskSamples, departure: Departure) -> Finding:
     """The error and its bound: at the worst, and at the end if the error is above the bound there."""
     norm = np.linalg.norm(samples.error, axis=1)
     last = len(norm) - 1
@@ -291,7 +291,7 @@ def _above_decay(samples: Samples, departure: Departure) -> Finding:
 
 
 def _seen(
-    controller: Controller, recorder: Recorder, samples: Samples, left: Departure | None
+    controller: Controller, recorder: Recorder, samples: TaskSamples, left: Departure | None
 ) -> Iterator[Finding | None]:
     """Possible causes where the error exceeds its expected decay, or at the end of an unfinished run."""
     chatter = chattering(samples.t, samples.u, controller.robot.u_names)

@@ -12,7 +12,7 @@ from nmm.control.functions.function import Row, row_scales
 from nmm.control.resolvers.damped_least_squares import DampedLeastSquares
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.reach import Reach, joint_position, reach
-from nmm.motion.diagnosis.error_bound import Departure, Samples
+from nmm.motion.diagnosis.error_bound import Departure, TaskSamples
 
 #: Below this ratio of smallest to largest singular value of the scaled J a departure is put down to it.
 SINGULAR = 0.02
@@ -76,7 +76,7 @@ def stretched(controller: Controller, q: Array, J: Array) -> Finding | None:
 
 
 def singularity(
-    controller: Controller, samples: Samples, q: Array, departure: Departure
+    controller: Controller, samples: TaskSamples, q: Array, departure: Departure
 ) -> Iterator[Finding | None]:
     """Whether J was singular between two samples, or nearly so, where the error exceeds its decay."""
     first, last = max(0, departure.first - 1), min(len(q) - 1, departure.worst + 1)
@@ -102,13 +102,13 @@ def near_singularity(
     return Finding(code, values, {"t": float(t)})
 
 
-def switching(samples: Samples, departure: Departure) -> Finding | None:
+def switching(samples: TaskSamples, departure: Departure) -> Finding | None:
     switches = np.any(np.diff(samples.partition, axis=0) != 0, axis=1)
     count = int(np.sum(switches[max(0, departure.first - 1) :]))
     return Finding("partition_switching", {"times": count}) if count >= SWITCHES else None
 
 
-def inputs_fell_short(controller: Controller, samples: Samples, departure: Departure) -> Finding | None:
+def inputs_fell_short(controller: Controller, samples: TaskSamples, departure: Departure) -> Finding | None:
     """With what damped them, where damped least squares did at the worst sample."""
     excess = float(np.linalg.norm(samples.error[departure.worst]) - departure.bound[departure.worst])
     if departure.unmet[departure.worst] < 0.5 * excess:
@@ -125,7 +125,7 @@ def inputs_fell_short(controller: Controller, samples: Samples, departure: Depar
     return Finding("inputs_fell_short", values)
 
 
-def still_moving(controller: Controller, samples: Samples) -> Finding | None:
+def still_moving(controller: Controller, samples: TaskSamples) -> Finding | None:
     """Whether the robot still moves at the end, unasked, though its target is at rest."""
     asked, feedback = samples.rate, samples.feedback.rates(samples.error)
     late = samples.t >= samples.t[-1] - LATE * (samples.t[-1] - samples.t[0])
@@ -147,7 +147,7 @@ def still_moving(controller: Controller, samples: Samples) -> Finding | None:
     return Finding("still_moving", values)
 
 
-def unresolved(samples: Samples, departure: Departure) -> Finding | None:
+def unresolved(samples: TaskSamples, departure: Departure) -> Finding | None:
     """The change of the inputs along the step on which the error exceeds its expected decay."""
     k = max(1, departure.first)
     before, after = samples.u[k - 1], samples.u[k]
@@ -158,7 +158,7 @@ def unresolved(samples: Samples, departure: Departure) -> Finding | None:
     return Finding("inputs_changed", {"percent": 100 * change / larger}, {"t": float(samples.t[k])})
 
 
-def _passed(controller: Controller, samples: Samples, q: Array, k: int) -> Finding | None:
+def _passed(controller: Controller, samples: TaskSamples, q: Array, k: int) -> Finding | None:
     """Whether J is singular between sample k and the next one."""
     t = float(samples.t[k])
     ways = [(1 - share) * q[k] + share * q[k + 1] for share in np.linspace(0.0, 1.0, BETWEEN + 1)]

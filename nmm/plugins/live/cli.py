@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from nmm.base.errors import InputError, expect
-from nmm.cli.groups import Browser, Ellipsoids, Loading, Subject, command
+from nmm.cli.groups import Browser, EllipsoidGroup, Loading, Subject, command
 from nmm.cli.options import ARM, AT, ROBOT_HELP, SUBJECT_SET, arguments_of, flag, option, task_option
 from nmm.cli.output import progress, show_text, warn
 
@@ -27,7 +27,7 @@ RunFolder = Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A folder of 
 
 
 @command
-def play(folder: RunFolder, browser: Browser, ellipsoids: Ellipsoids) -> None:
+def play(folder: RunFolder, browser: Browser, ellipsoids: EllipsoidGroup) -> None:
     """Play a run in the browser.
 
     In 3D, with MeshCat; only this machine can reach it. Ctrl-C ends it.
@@ -52,7 +52,7 @@ def render(
     follow: bool = flag("--follow", "The camera goes with the robots."),
     plots: bool = flag("--plots", "The curves are beside the robot."),
     apart: float = option("SHARE", "Compared robots over one another (0) or side by side (1).", default=0.0),
-    ellipsoids: Ellipsoids,
+    ellipsoids: EllipsoidGroup,
 ) -> None:
     """Make a video of a run.
 

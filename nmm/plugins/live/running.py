@@ -46,7 +46,7 @@ PATIENCE = 1.0
 ROLLED = 32
 
 
-class Leg(NamedTuple):
+class LiveLeg(NamedTuple):
     """The record between two events, and the rows of the tasks active then."""
 
     recorder: Recorder
@@ -111,7 +111,7 @@ class LiveRun(RobotSession):
         self._title = robot.name if title is None else title
         self._end = float(duration)
         self._growing = Growing(controller)
-        self._legs: list[Leg] = []
+        self._legs: list[LiveLeg] = []
         self._leg, self._sample, self._instant = 0, 0, -1.0  # the next one to show, and what KEPT counts
         self._times: list[float] = []
         self._values: list[Array] = []
@@ -147,7 +147,7 @@ class LiveRun(RobotSession):
         """Show what that recorder gets from now on; `simulate` calls it."""
         if not self._legs:
             self._began = time.monotonic()
-        self._legs.append(Leg(recorder, self._growing.active_rows()))
+        self._legs.append(LiveLeg(recorder, self._growing.active_rows()))
 
     def stay(
         self, run: Trajectory, *, ellipsoids: Wanted = False, stop: threading.Event | None = None
@@ -264,7 +264,7 @@ class LiveRun(RobotSession):
         if new or text != before.text:
             self._picture = Picture(before.number + 1, len(self._times), self.placed(self._t), text)
 
-    def _take(self, leg: Leg, at: Integers) -> None:
+    def _take(self, leg: LiveLeg, at: Integers) -> None:
         """Take a leg's samples `at`: the robot's place at the last one, and the curves' samples."""
         recorded, times = leg.recorder.found, leg.recorder.t
         rolled = at[np.unique(np.linspace(0, len(at) - 1, min(len(at), ROLLED)).astype(int))]

@@ -16,7 +16,7 @@ from typing import Any, Self
 import numpy as np
 
 from nmm.base.errors import InputError, expect
-from nmm.base.resolver_style import Look
+from nmm.base.resolver_style import RunStyle
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.robots.motion import Camera
 from nmm.model.robots.robot import Robot
@@ -150,7 +150,7 @@ class RobotSession(Session):
         obstacles: Sequence[Obstacle] = (),
         surroundings: Surroundings = NO_SURROUNDINGS,
         channels: Sequence[Channel] = (),
-        look: Look | None = None,
+        look: RunStyle | None = None,
         cameras: Sequence[Camera] = (),
         further: Sequence[Command] = (),
         **page: Any,

@@ -79,7 +79,7 @@ class GoalPostures:
     def _reaching(self, wanted: object, start: Array, rng: np.random.Generator) -> Iterator[Array | None]:
         robot = self.robot
         if isinstance(wanted, Task):
-            solve = Reaching(robot, wanted, self.tolerance)
+            solve = TargetSolver(robot, wanted, self.tolerance)
             yield solve(start)
             for _ in range(ATTEMPTS):
                 yield solve(rng.uniform(self.low, self.high))
@@ -224,7 +224,7 @@ class TaskError:
         return value[:s].copy(), value[s : 2 * s].copy(), self._own.error.copy(), self._own.error_q.copy()
 
 
-class Reaching(TaskError):
+class TargetSolver(TaskError):
     """Newton's method for a task whose target stands, within limits."""
 
     def __init__(self, robot: Robot, task: Task, tolerance: Goal) -> None:

@@ -16,10 +16,10 @@ from nmm.base.arrays import Array
 from nmm.control.limits.limits import LimitsOn
 from nmm.model.robots.zero_order_hold import inputs_of
 from nmm.plugins.planning.collisions.legs_check import MARGIN
-from nmm.plugins.planning.holding import ARRIVED, Followed, Held
+from nmm.plugins.planning.holding import ARRIVED, FollowedPath, Held
 from nmm.plugins.planning.path import Guide
 from nmm.plugins.planning.problem import TURN
-from nmm.plugins.planning.samples import SampledMotion, Samples
+from nmm.plugins.planning.samples import MotionSamples, SampledMotion
 from nmm.plugins.planning.timing import inputs_of_leg, spins_of
 
 #: The steps by which the arm follows, s, and its joints', rad or m, halved until what is held is off by no
@@ -51,7 +51,7 @@ class HeldTiming:
                 return motions
         return None
 
-    def _timed(self, start: Array, legs: Array, path: Followed) -> list[SampledMotion] | None:
+    def _timed(self, start: Array, legs: Array, path: FollowedPath) -> list[SampledMotion] | None:
         motions, corner = [], start
         for k, leg in enumerate(legs):
             own = path.places[:, 0] == k
@@ -106,7 +106,7 @@ class HeldTiming:
             harder = float(np.nanmax(a / np.where(a >= 0.0, *limits.changes.T[::-1]), initial=0.0))
         slower = max(1.0, float(np.nanmax(over, initial=0.0)), math.sqrt(harder)) * (1.0 + 1e-9)
         turn = float(np.abs(np.diff(q[:, 2:3], axis=0)).max(initial=0.0)) if p >= 3 else 0.0
-        samples = Samples(
+        samples = MotionSamples(
             inputs_of(robot),
             np.concatenate([[0.0], np.cumsum(slower * steps)]),
             np.array(max(2, math.ceil(turn / TURN)), dtype=np.int64),

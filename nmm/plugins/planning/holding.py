@@ -129,7 +129,7 @@ _FLAT, _ROWS = float64[::1], float64[:, ::1]
 FOLLOW = int64(*(*BLOCKS.types, *BLOCKS.types, _FLAT, _ROWS, *(2 * [float64]), _ROWS, _ROWS, int64[::1]))
 
 
-class Followed(NamedTuple):
+class FollowedPath(NamedTuple):
     """A path as far as the arm follows it: nodes (K, n), of each its leg and how much of it is gone
     (K, 2), and why it ended."""
 
@@ -204,12 +204,12 @@ class Held(TaskError):
         """Bring the arm of q (n,) onto what is held, in place; whether it is kept."""
         return self.along(q, np.zeros((0, 3 + len(q))), 1.0, 1.0).ended == ARRIVED
 
-    def along(self, q: Array, legs: Array, tick: float, far: float) -> Followed:
+    def along(self, q: Array, legs: Array, tick: float, far: float) -> FollowedPath:
         """How far the arm follows along legs (L, 3 + n) from q (n,), by steps of so many s, and of joints by
         so many rad or m, at most."""
         arguments = *self.check.blocks, *self._program.blocks, q, np.ascontiguousarray(legs), tick, far
         count = self._follow(*arguments, self._nodes, self._places, self._ended)
-        return Followed(self._nodes[:count].copy(), self._places[:count].copy(), int(self._ended[0]))
+        return FollowedPath(self._nodes[:count].copy(), self._places[:count].copy(), int(self._ended[0]))
 
     def off(self, q: Array) -> tuple[float, float]:
         """By how much it is not kept at q (n,), m and rad."""

@@ -28,7 +28,7 @@ from nmm.plugins.planning.interior import SHOOT, shoot
 from nmm.plugins.planning.plan import Plan
 from nmm.plugins.planning.problem import END, MARGIN, largest_inputs, shooting_problem
 from nmm.plugins.planning.recorded import recorded
-from nmm.plugins.planning.samples import SampledMotion, Samples
+from nmm.plugins.planning.samples import MotionSamples, SampledMotion
 from nmm.plugins.planning.shooting import LOOK, Shooting, first_blocked_sample
 
 #: Speeds of inputs without limits, m/s and rad/s.
@@ -173,7 +173,7 @@ class Horizon:
             self.solved = self._found()
         if self.solved:
             x.u[-1] = 0.0
-            samples = Samples(x.inputs, self._times, x.substeps, x.q, x.u, x.a)
+            samples = MotionSamples(x.inputs, self._times, x.substeps, x.q, x.u, x.a)
             self._motion, self._begun = SampledMotion(samples, ()), t
         return self._ahead(t + self.dt, current)[1][0]
 

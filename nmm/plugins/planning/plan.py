@@ -26,7 +26,7 @@ from nmm.plugins.planning.recorded import recorded
 from nmm.plugins.planning.samples import SampledMotion
 
 
-class Motion(Protocol):
+class TimedMotion(Protocol):
     """A motion in time.
 
     stops (K,) : when it begins, rests between and ends, s; corners (K, n) : where it is then
@@ -64,7 +64,7 @@ class Found(NamedTuple):
     """What a search leaves to a plan: its motion, what that keeps, what another search is made with, and the
     trees that were grown, (E, 2, n)."""
 
-    motion: Motion
+    motion: TimedMotion
     limits: LimitsOn
     scene: Scene | None
     goal: Wanted

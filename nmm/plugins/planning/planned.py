@@ -26,9 +26,9 @@ from nmm.plugins.planning.goals import Wanted, alternatives
 from nmm.plugins.planning.held_motion import HeldTiming
 from nmm.plugins.planning.held_search import HeldWays, refuse_beside_hold
 from nmm.plugins.planning.holding import Held
-from nmm.plugins.planning.plan import Asked, Found, Motion, Plan
+from nmm.plugins.planning.plan import Asked, Found, Plan, TimedMotion
 from nmm.plugins.planning.samples import SampledMotion, joined
-from nmm.plugins.planning.search import Search
+from nmm.plugins.planning.search import PlanSearch
 from nmm.plugins.planning.search_space import USUAL
 from nmm.plugins.planning.smoothing import Smoothing
 from nmm.plugins.planning.timing import TimedLegs, timed
@@ -136,11 +136,13 @@ def plan(
         margin=scalar(margin, "plan: margin", least=0.0),
         hold=hold,
     )
-    search = Search(robot, q, [*through, goal], asked, seed)
+    search = PlanSearch(robot, q, [*through, goal], asked, seed)
     return planned(search, positive(seconds, "seconds"), counted(shorten, "shorten", 0), progress)
 
 
-def planned(search: Search, seconds: float, shorten: int, progress: Callable[[float], None] | None) -> Plan:
+def planned(
+    search: PlanSearch, seconds: float, shorten: int, progress: Callable[[float], None] | None
+) -> Plan:
     """From a search's start through all its goals; each part ends where the next begins."""
     begin = partial(search.begin, seconds, progress)
     if isinstance(search.robot.platform, Tractor):
@@ -158,10 +160,10 @@ def planned(search: Search, seconds: float, shorten: int, progress: Callable[[fl
     return finished(search, *parts)
 
 
-def finished(search: Search, *parts: Array) -> Plan:
+def finished(search: PlanSearch, *parts: Array) -> Plan:
     """The plan of legs from the start; a smooth one rests between the parts."""
     path = _timed(search, search.start, np.vstack(parts))
-    motion: Motion = path
+    motion: TimedMotion = path
     if search.movers is not None:
         motion = _waited(search, path, search.movers)
     elif search.asked.smooth:
@@ -169,7 +171,7 @@ def finished(search: Search, *parts: Array) -> Plan:
     return _found(search, motion)
 
 
-def _waited(search: Search, path: TimedLegs, movers: Scene) -> TimedLegs:
+def _waited(search: PlanSearch, path: TimedLegs, movers: Scene) -> TimedLegs:
     """The path, or another way, with a timing among what moves; `RunError` where none of them has one."""
     timing, looked = waited(path, search.robot, movers)
     ways = 1
@@ -190,7 +192,7 @@ def _waited(search: Search, path: TimedLegs, movers: Scene) -> TimedLegs:
     return timing
 
 
-def _another_way(search: Search, at: float | None, k: int, seconds: float) -> Found:
+def _another_way(search: PlanSearch, at: float | None, k: int, seconds: float) -> Found:
     """The way of another seed, with what moves standing where it is at a time, s; without it at None."""
     collisions = search.asked.collisions
     standing = [obstacle for obstacle in collisions.obstacles if not obstacle.moves]
@@ -200,11 +202,11 @@ def _another_way(search: Search, at: float | None, k: int, seconds: float) -> Fo
             Obstacle(obstacle.shape, obstacle.placement(at), name=obstacle.name) for obstacle in moves
         ]
     asked = replace(search.asked, collisions=replace(collisions, obstacles=tuple(standing)), smooth=False)
-    other = Search(search.robot, search.start, search.goals, asked, search.seed + k)
+    other = PlanSearch(search.robot, search.start, search.goals, asked, search.seed + k)
     return planned(other, seconds, SHORTEN, None).found
 
 
-def _smoothed(search: Search, parts: Sequence[Array]) -> SampledMotion | None:
+def _smoothed(search: PlanSearch, parts: Sequence[Array]) -> SampledMotion | None:
     """The parts as smooth motions with rests between them; None where one of them is not found."""
     smoothing = Smoothing(search.robot, search.limits, USUAL, search.check, search.costs)
     motions, q = [], search.start
@@ -219,7 +221,7 @@ def _smoothed(search: Search, parts: Sequence[Array]) -> SampledMotion | None:
     return joined(motions) if motions else None
 
 
-def _towed(search: Search, tractor: Tractor, begin: Callable[[], None]) -> Plan:
+def _towed(search: PlanSearch, tractor: Tractor, begin: Callable[[], None]) -> Plan:
     """The plan of a tractor with trailers, which is smooth."""
     robot = search.robot
     if search.movers is not None:
@@ -251,7 +253,7 @@ def _named(robot: Robot, wanted: object) -> set[str] | None:
     return named
 
 
-def _holding(search: Search, hold: Task | str, shorten: int, begin: Callable[[], None]) -> Plan:
+def _holding(search: PlanSearch, hold: Task | str, shorten: int, begin: Callable[[], None]) -> Plan:
     """The plan along which the arm holds something."""
     robot, asked = search.robot, search.asked
     refuse_beside_hold(robot, asked)
@@ -268,25 +270,25 @@ def _holding(search: Search, hold: Task | str, shorten: int, begin: Callable[[],
     return _found(search, joined(motions) if motions else _still(search, q))
 
 
-def _timed(search: Search, start: Array, legs: Array) -> TimedLegs:
+def _timed(search: PlanSearch, start: Array, legs: Array) -> TimedLegs:
     guide = search.guide
     motion = timed(guide, search.robot, start, guide.merged(legs), search.limits, search.usual)
     return motion if search.efforts is None else search.efforts.legs(motion)
 
 
-def _still(search: Search, q: Array) -> TimedLegs:
+def _still(search: PlanSearch, q: Array) -> TimedLegs:
     return _timed(search, q, np.zeros((0, 3 + search.robot.n)))
 
 
-def _within_efforts(search: Search, motion: SampledMotion) -> SampledMotion:
+def _within_efforts(search: PlanSearch, motion: SampledMotion) -> SampledMotion:
     return motion if search.efforts is None else search.efforts.samples(motion)
 
 
-def _found(search: Search, motion: Motion) -> Plan:
+def _found(search: PlanSearch, motion: TimedMotion) -> Plan:
     motions, postures = (int(count) for count in search.trees.looked)
     return _plan(search, motion, motions, postures)
 
 
-def _plan(search: Search, motion: Motion, motions: int, postures: int) -> Plan:
+def _plan(search: PlanSearch, motion: TimedMotion, motions: int, postures: int) -> Plan:
     result = Found(motion, search.limits, search.scene, search.goals[-1], search.asked, search.tree)
     return Plan(search.robot, motions, postures, result)

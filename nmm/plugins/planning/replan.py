@@ -16,7 +16,7 @@ from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.platforms.tractor import Tractor
 from nmm.plugins.planning.plan import Plan
 from nmm.plugins.planning.planned import finished
-from nmm.plugins.planning.search import STEP, Search
+from nmm.plugins.planning.search import STEP, PlanSearch
 
 #: Times at which the plan's nearest point is looked for, s apart.
 NEAR = 0.05
@@ -80,7 +80,7 @@ def replan(
         asked = replace(asked, collisions=replace(asked.collisions, obstacles=tuple(obstacles)))
     if any(obstacle.moves for obstacle in asked.collisions.obstacles):
         raise InputError("obstacles that move along a path are not replanned for", where="replan: obstacles")
-    search = Search(robot, start, [old.goal], asked, seed)
+    search = PlanSearch(robot, start, [old.goal], asked, seed)
     search.begin(positive(seconds, "seconds"), progress)
     rest = _rest(plan, start, t)
     if search.check.too_near(rest[-1]) < 0:
@@ -114,7 +114,9 @@ def _rest(plan: Plan, q: Array, t: float | None) -> list[Array]:
     return list(plan(np.concatenate([*parts, [plan.duration]]))[0])
 
 
-def _join(search: Search, q: Array, rest: Sequence[Array], ways: Sequence[Array]) -> tuple[int | None, Array]:
+def _join(
+    search: PlanSearch, q: Array, rest: Sequence[Array], ways: Sequence[Array]
+) -> tuple[int | None, Array]:
     """At which of these configurations, joined by ways, the soonest free way from q joins them, and it."""
     joins = [search.guide.way(q, configuration) for configuration in rest]
     after = np.cumsum([0.0, *(search.guide.times(way).sum() for way in ways[: len(rest) - 1])])

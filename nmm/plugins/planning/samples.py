@@ -165,7 +165,7 @@ def write_fastest(
         leg[i] += change[i]
 
 
-class Samples(NamedTuple):
+class MotionSamples(NamedTuple):
     """N samples, one after the other.
 
     inputs : what they move; begin (N + 1,) : when each begins and the last ends, s; substeps () : of each
@@ -183,7 +183,7 @@ class Samples(NamedTuple):
 @compiled
 def _follow(integers: Integers, floats: Array, times: Array, q: Array, u: Array, q_dot: Array) -> None:
     """q (K, n), u (K, m) and q_dot (K, n) at times (K,)."""
-    samples, none = views(Samples, integers, floats, 0), scratch((q.shape[1], 0))
+    samples, none = views(MotionSamples, integers, floats, 0), scratch((q.shape[1], 0))
     inputs, N, k = samples.inputs, samples.a.shape[0], 0
     for i in range(times.shape[0]):
         while k > 0 and samples.begin[k] > times[i]:
@@ -211,11 +211,11 @@ class SampledMotion:
     stops (K,) : when it rests, s; corners (K, n) : where it is then; samples : its numbers
     """
 
-    def __init__(self, samples: Samples, rests: Sequence[int]) -> None:
+    def __init__(self, samples: MotionSamples, rests: Sequence[int]) -> None:
         memory = Memory()
         memory.add(samples)
         self._blocks = memory.blocks()
-        self.samples = views(Samples, *self._blocks, 0)
+        self.samples = views(MotionSamples, *self._blocks, 0)
         self._follow = checked_by_caller(_follow, _FOLLOW)
         places = [0, *rests, len(samples.a)]
         self.stops, self.corners = self.samples.begin[places], self.samples.q[places]
@@ -246,5 +246,5 @@ def joined(motions: Sequence[SampledMotion]) -> SampledMotion:
     )
     substeps = np.array(max(int(part.substeps) for part in parts))
     rests = np.cumsum([len(part.a) for part in parts[:-1]], dtype=np.int64).tolist()
-    whole = Samples(parts[0].inputs, begin, substeps, q, u, np.vstack([part.a for part in parts]))
+    whole = MotionSamples(parts[0].inputs, begin, substeps, q, u, np.vstack([part.a for part in parts]))
     return SampledMotion(whole, rests)

@@ -37,7 +37,7 @@ STEP = 2.0
 T = TypeVar("T")
 
 
-class Search:
+class PlanSearch:
     """What one plan needs: the trees, the check of distances, and the goals."""
 
     _ends: float

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field
 
 from nmm.base.errors import InputError, expect
 from nmm.control.functions.tasks.task import Task
-from nmm.scenario.keys import Part, at
+from nmm.scenario.keys import KeyedPart, at
 from nmm.scenario.limits import GoalPart, part_or_none
 from nmm.scenario.numbers import Number, Positive, Whole
 from nmm.scenario.objectives import ObjectiveList, build_objective
@@ -31,7 +31,7 @@ def _goal(value: object) -> dict[str, Any]:
 Coordinates = Annotated[dict[str, Any], BeforeValidator(_goal)]
 
 
-class TrackPart(Part):
+class TrackPart(KeyedPart):
     """The plan is the controller's task, with limits and distances as they are; `track: true` is this with
     its defaults."""
 
@@ -66,7 +66,7 @@ class PlanSection(Section):
         "plan.track alone"
     )
     after: ClassVar[str] = "collisions"
-    listed: ClassVar[Mapping[str, type[Part]]] = {"plan.track": TrackPart}
+    listed: ClassVar[Mapping[str, type[KeyedPart]]] = {"plan.track": TrackPart}
     needs: ClassVar[tuple[str, ...]] = ("q0",)
     takes_until: ClassVar[bool] = True
     searches: ClassVar[bool] = True

@@ -18,7 +18,7 @@ from nmm.plugins.planning.collisions.motion_check import MotionCheck
 from nmm.plugins.planning.interior import SHOOT, shoot
 from nmm.plugins.planning.objective import SampleCosts
 from nmm.plugins.planning.problem import MU, largest_inputs, shooting_problem, steps_within
-from nmm.plugins.planning.samples import SampledMotion, Samples
+from nmm.plugins.planning.samples import MotionSamples, SampledMotion
 from nmm.plugins.planning.shooting import LOOK, Shooting, first_blocked_sample
 
 #: How many samples a motion has: one for each so many seconds of the path's time, within limits.
@@ -175,7 +175,7 @@ class Smoothing:
         u[-1] = 0.0
         a[-1] = -u[-2] / x.step
         begin = np.append(np.arange(N) * x.step, N * x.step)
-        return SampledMotion(Samples(x.inputs, begin, x.substeps, x.q, u, a), ())
+        return SampledMotion(MotionSamples(x.inputs, begin, x.substeps, x.q, u, a), ())
 
     def _within(self, motion: SampledMotion) -> bool:
         """Whether coordinates and wheels keep their limits within samples, too: where joints turn round."""

@@ -16,7 +16,7 @@ from nmm.control.controller import Controller
 from nmm.control.integrators import integrator
 from nmm.control.step.recorded import NOTE_SAMPLE, Recorded, note_sample, room
 from nmm.motion.joining import join
-from nmm.motion.leg import Ended, Leg
+from nmm.motion.leg import Leg, RunEnd
 from nmm.motion.recording import Recorder
 from nmm.motion.trajectory import Trajectory
 from nmm.motion.verdict import Outcome, Verdict
@@ -90,7 +90,7 @@ class LogPart:
         found, t = Recorded._make(values[order] for values in self._found), self._t[order]
         recorder = Recorder.of(self.controller, t, found, [*self._places][count - last :])
         solver, held = self.controller.solver, integrator("zoh", self.controller.robot, 1e-9)
-        ended = Ended(Outcome.COMPLETED, (), found.q[-1], solver.derivatives[0])
+        ended = RunEnd(Outcome.COMPLETED, (), found.q[-1], solver.derivatives[0])
         return Leg(self.controller, self.active, held, recorder, ended, float(t[-1]))
 
 

@@ -1,8 +1,8 @@
-from .bounds import Bound as Bound
+from .bounds import NonzeroMinor as NonzeroMinor
 from .bounds import lower_bound as lower_bound
 from .bounds import never_zero as never_zero
 from .bounds import vanishing as vanishing
-from .claims import Claim as Claim
+from .claims import RankClaim as RankClaim
 from .claims import singular_set as singular_set
 from .expansion import TooLarge as TooLarge
 from .from_robot import symbolic as symbolic

@@ -10,14 +10,14 @@ from sympy.printing.str import StrPrinter
 
 from nmm.base.findings import Finding
 from nmm.base.latex import Formula, formula, linear_formula, minor_name, symbol
-from nmm.plugins.symbolic.claims import NOTHING, Claim
+from nmm.plugins.symbolic.claims import NOTHING, RankClaim
 from nmm.plugins.symbolic.expressions import Product, Sum, Symbol, Trig, alone, inline, is_constant, to_sympy
 from nmm.plugins.symbolic.readable import condition, expanded
 from nmm.plugins.symbolic.symbolic_analysis import SymbolicAnalysis
 
 
 @dataclass(frozen=True)
-class Bound:
+class NonzeroMinor:
     """Conditions on the lengths under which a minor vanishes nowhere.
 
     Attributes
@@ -101,7 +101,7 @@ class _Text(StrPrinter):
         return f"|{self._print(of.args[0])}|"
 
 
-def lower_bound(analysis: SymbolicAnalysis) -> Claim | None:
+def lower_bound(analysis: SymbolicAnalysis) -> RankClaim | None:
     """det J Jᵀ >= C² / Σ a² by Cauchy and Schwarz, where Σ a Δ = C has no coordinates; None without such a C.
 
     If C is a product of lengths, J never loses rank.
@@ -143,11 +143,13 @@ def lower_bound(analysis: SymbolicAnalysis) -> Claim | None:
             Finding("squares_bounded", {"bound": bound, "count": len(used)}),
             Finding("cauchy_binet"),
         )
-        return Claim(Finding("gram_bound", {"bound": bound}), steps, (to_sympy(constant, analysis.symbols),))
+        return RankClaim(
+            Finding("gram_bound", {"bound": bound}), steps, (to_sympy(constant, analysis.symbols),)
+        )
     return None
 
 
-def never_zero(analysis: SymbolicAnalysis) -> dict[tuple[str, ...], Bound]:
+def never_zero(analysis: SymbolicAnalysis) -> dict[tuple[str, ...], NonzeroMinor]:
     """The minors that vanish nowhere under a condition on the lengths, and the condition.
 
     A factor that is a sum vanishes nowhere if its term without coordinates exceeds the sum of the others'
@@ -174,7 +176,7 @@ def never_zero(analysis: SymbolicAnalysis) -> dict[tuple[str, ...], Bound]:
             requires.append(condition)
             exact = exact and isinstance(factor, Sum) and _attained(factor, analysis)
         else:
-            bounds[columns] = Bound(columns, tuple(requires), tuple(nonzero), exact)
+            bounds[columns] = NonzeroMinor(columns, tuple(requires), tuple(nonzero), exact)
     return bounds
 
 

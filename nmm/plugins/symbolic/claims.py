@@ -20,18 +20,18 @@ from nmm.plugins.symbolic.expressions import (
 )
 from nmm.plugins.symbolic.readable import condition, factored, in_names
 from nmm.plugins.symbolic.symbolic_analysis import SymbolicAnalysis
-from nmm.plugins.symbolic.zeros import Basis, Limits, Undecided, Zeros
+from nmm.plugins.symbolic.zeros import GroebnerBasis, GroebnerLimits, Undecided, Zeros
 
 #: Smaller values are rounding, also by a file's digits, and count as zero.
 NOTHING = 1e-9
 #: A longer proof is not readable.
 _CASES = 200
 #: For a proof in one step; beyond them, cases are distinguished.
-_BRIEF = Limits(100, 1000, 10_000)
+_BRIEF = GroebnerLimits(100, 1000, 10_000)
 
 
 @dataclass(frozen=True)
-class Claim:
+class RankClaim:
     """A statement and the steps of its proof; `str` of each is a sentence.
 
     Attributes
@@ -53,7 +53,7 @@ class Claim:
         return self.statement.code != "rank_undecided"
 
 
-def singular_set(analysis: SymbolicAnalysis, zero: Sequence[str] = ()) -> Claim:
+def singular_set(analysis: SymbolicAnalysis, zero: Sequence[str] = ()) -> RankClaim:
     """Where J loses rank, for all values of the lengths that are not zero.
 
     A factor of a minor that depends on lengths alone counts as zero, or not, as it is for this robot.
@@ -78,7 +78,7 @@ def singular_set(analysis: SymbolicAnalysis, zero: Sequence[str] = ()) -> Claim:
     gone = list(analysis.derivation.zero)
     if not forms:
         step = Finding("minors_identically_zero")
-        return Claim(Finding("rank_lost", {"rank": s, **_some(gone=gone)}), (step,))
+        return RankClaim(Finding("rank_lost", {"rank": s, **_some(gone=gone)}), (step,))
     domain = _domain(analysis, list(forms.values()))
     vanish = [
         columns for columns, form in forms.items() if any(alone(f) in domain.zero for f, _ in form.factors)
@@ -88,19 +88,19 @@ def singular_set(analysis: SymbolicAnalysis, zero: Sequence[str] = ()) -> Claim:
     forms = {columns: form for columns, form in forms.items() if columns not in vanish}
     if not forms:
         nowhere = domain._replace(nonzero=[])
-        return Claim(Finding("rank_lost", {"rank": s, **nowhere.assumptions(analysis)}), tuple(steps))
+        return RankClaim(Finding("rank_lost", {"rank": s, **nowhere.assumptions(analysis)}), tuple(steps))
     try:
         needed = _nowhere(list(forms.values()), domain)
         if needed is not None:
             steps.append(Finding("nullstellensatz", _some(divided=[inline(f) for f in needed.nonzero])))
-            return Claim(Finding("rank_full", {"rank": s, **needed.assumptions(analysis)}), tuple(steps))
+            return RankClaim(Finding("rank_full", {"rank": s, **needed.assumptions(analysis)}), tuple(steps))
         cases = Cases(analysis, forms, domain)
     except Undecided:
-        return Claim(Finding("rank_undecided", _some(gone=gone)))
+        return RankClaim(Finding("rank_undecided", _some(gone=gone)))
     steps += cases.steps
     assumptions = domain.assumptions(analysis)
     if not cases.families:
-        return Claim(Finding("rank_full", {"rank": s, **assumptions}), tuple(steps))
+        return RankClaim(Finding("rank_full", {"rank": s, **assumptions}), tuple(steps))
     conditions = [[condition(factor, analysis.named_forms) for factor in family] for family in cases.families]
     factors = [in_names(factor, analysis.named_forms) for family in cases.families for factor in family]
     used = {leaf.name for leaf in leaves(*factors) if isinstance(leaf, Symbol)}
@@ -115,7 +115,7 @@ def singular_set(analysis: SymbolicAnalysis, zero: Sequence[str] = ()) -> Claim:
             family[0] if len(family) == 1 else sympy.Add(*(part**2 for part in family)) for family in families
         ]
         vanishing = (sympy.Mul(*sums),)
-    return Claim(statement, tuple(steps), vanishing, families)
+    return RankClaim(statement, tuple(steps), vanishing, families)
 
 
 def _some(**values: list[Any]) -> dict[str, Any]:
@@ -130,7 +130,7 @@ class Domain(NamedTuple):
     below: list[Product]
     zero: list[Product]
 
-    def zeros(self, products: Sequence[Product], limits: Limits | None = None) -> Zeros:
+    def zeros(self, products: Sequence[Product], limits: GroebnerLimits | None = None) -> Zeros:
         return Zeros(products, [*self.nonzero, *self.below], limits, self.zero)
 
     def assumptions(self, analysis: SymbolicAnalysis) -> dict[str, Any]:
@@ -208,7 +208,7 @@ class Cases:
         self.families = [self._plain(family) for family in self.families]
         self._drop_parts()
 
-    def _case(self, vanishing: list[Product], basis: Basis) -> None:
+    def _case(self, vanishing: list[Product], basis: GroebnerBasis) -> None:
         self._count += 1
         if self._count > _CASES:
             raise Undecided

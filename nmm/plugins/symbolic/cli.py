@@ -18,7 +18,7 @@ from nmm.cli.singularity_report import header, row_names
 if TYPE_CHECKING:
     from nmm.cli.subjects import Studied
     from nmm.model.robots.robot import Robot
-    from nmm.plugins.symbolic import Claim, SymbolicAnalysis
+    from nmm.plugins.symbolic import RankClaim, SymbolicAnalysis
 
 #: Reasons for more minors than these are not given.
 MANY_REASONS = 12
@@ -215,7 +215,7 @@ def _of_rank(studied: Studied, analysis: SymbolicAnalysis) -> Iterator[Conclusio
         yield _conclusion(without, hint, before)
 
 
-def _conclusion(claim: Claim, hint: Finding | None = None, before: str = "") -> Conclusion:
+def _conclusion(claim: RankClaim, hint: Finding | None = None, before: str = "") -> Conclusion:
     angles = [_angle(condition) for condition in claim.conditions]
     values = [angle for angle in angles if angle is not None]
     means = (Finding("zero_angles", {"values": values}),) if values and len(values) == len(angles) else ()

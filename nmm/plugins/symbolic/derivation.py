@@ -14,7 +14,7 @@ from nmm.control.functions.tasks.task import Stack
 from nmm.model.platforms.base import Platform
 from nmm.model.robots.robot import Robot
 from nmm.plugins.symbolic.expansion import Expansion, Ring, exact
-from nmm.plugins.symbolic.frames import Frames
+from nmm.plugins.symbolic.frames import SymbolicFrames
 from nmm.plugins.symbolic.geometry import Geometry
 from nmm.plugins.symbolic.quotient import Quotient, Untraceable, common_multiple, quotient
 from nmm.plugins.symbolic.task_rows import TracedRow, task_rows
@@ -27,7 +27,7 @@ _READABLE = 20
 Columns = tuple[list[list[Expansion]], list[Expansion]]
 
 
-def platform_columns(frames: Frames) -> Columns:
+def platform_columns(frames: SymbolicFrames) -> Columns:
     """The rows of G (n_p, p), each column times a common denominator that may vanish, such as cos(steering),
     and these denominators (p); `InputError` says why a platform's kernel has no formula."""
     platform, ring = frames.robot.platform, frames.geometry.ring
@@ -46,7 +46,7 @@ def platform_columns(frames: Frames) -> Columns:
     return [[column[i] for column in above] for i in range(platform.n_p)], below
 
 
-def traced_G(platform: Platform, frames: Frames) -> tuple[np.ndarray, np.ndarray]:
+def traced_G(platform: Platform, frames: SymbolicFrames) -> tuple[np.ndarray, np.ndarray]:
     """G (n_p, p) and G_q (n_p, p, n_p) as the platform's kernel writes them; see `Platform.velocity_map`."""
     geometry, names = frames.geometry, platform.parameter_names
     parameters: list[object] = list(platform.parameters)
@@ -115,7 +115,7 @@ class Derivation:
 
 def derived(robot: Robot, stack: Stack, geometry: Geometry) -> Derivation:
     """Derive the rows of f, and (∂f/∂q - ∂g/∂q) S."""
-    frames = Frames(robot, geometry)
+    frames = SymbolicFrames(robot, geometry)
     frames.coordinates()
     rows = task_rows(stack, frames)
     G, columns = platform_columns(frames)
@@ -138,7 +138,7 @@ def derived(robot: Robot, stack: Stack, geometry: Geometry) -> Derivation:
     )
 
 
-def _denominator(row: TracedRow, frames: Frames) -> tuple[list[Expansion], Expansion]:
+def _denominator(row: TracedRow, frames: SymbolicFrames) -> tuple[list[Expansion], Expansion]:
     """The gradient times a common denominator (all that may vanish, auxiliary lengths too), and this."""
     under = common_multiple([entry.under for entry in row.gradient] + [*row.defined])
     above = [entry.above(under) for entry in row.gradient]
@@ -149,7 +149,9 @@ def _denominator(row: TracedRow, frames: Frames) -> tuple[list[Expansion], Expan
     return [entry * scalars for entry in above], under * scalars
 
 
-def _times_S(row: Sequence[Expansion], G: list[list[Expansion]], frames: Frames) -> tuple[Expansion, ...]:
+def _times_S(
+    row: Sequence[Expansion], G: list[list[Expansion]], frames: SymbolicFrames
+) -> tuple[Expansion, ...]:
     """A row times S = blkdiag(G, C)."""
     robot, ring = frames.robot, frames.geometry.ring
     platform, gradient = robot.platform, list(row)

@@ -85,7 +85,7 @@ def unread(what: str, dimensions: int) -> Any:
 
 
 @dataclass(eq=False)
-class Frames:
+class SymbolicFrames:
     """What kernels read of a robot, each quantity computed once."""
 
     robot: Robot
@@ -130,7 +130,7 @@ class Frames:
         forward = turns(steps, self.geometry)
         return [turned(forward, twist[3:], ring) for twist in self.twists(steps)]
 
-    def twists(self, steps: list[Step]) -> list[Vector]:
+    def twists(self, steps: list[ElementaryTransform]) -> list[Vector]:
         """The last frame's twist, v over ω, per coordinate, in its own axes."""
         by_joint, rest = twists(steps, self.geometry), [self.geometry.ring.number(0)] * 6
         return [by_joint.get(name, rest) for name in self.robot.q_names]
@@ -193,7 +193,7 @@ class Frames:
         return str(self._once(("matrix", product), lambda: "R" if count == 1 else f"R{count}"))
 
 
-class Step(NamedTuple):
+class ElementaryTransform(NamedTuple):
     """A fixed placement, or the motion of a joint, "revolute" or "prismatic", about or along a unit axis;
     `backward` for its inverse."""
 
@@ -205,7 +205,7 @@ class Step(NamedTuple):
     backward: bool = False
 
 
-def joint_steps(robot: Robot, index: int) -> list[Step]:
+def joint_steps(robot: Robot, index: int) -> list[ElementaryTransform]:
     """A joint's placement in the frame of the joint before, and its motion; `index` is Pinocchio's.
     `InputError` for a joint that neither turns nor slides."""
     model = robot.model
@@ -218,17 +218,23 @@ def joint_steps(robot: Robot, index: int) -> list[Step]:
         raise InputError(what, where="symbolic", expected="joints that turn or slide")
     name, slides = str(model.names[index]), bool(motion[:3].any())
     return [
-        Step(name, "fixed", np.array(placement.translation), np.array(placement.rotation)),
-        Step(name, "prismatic" if slides else "revolute", axis=motion[:3] if slides else motion[3:]),
+        ElementaryTransform(name, "fixed", np.array(placement.translation), np.array(placement.rotation)),
+        ElementaryTransform(
+            name, "prismatic" if slides else "revolute", axis=motion[:3] if slides else motion[3:]
+        ),
     ]
 
 
-def steps_to(robot: Robot, frame: str, seen_from: str | None = None) -> list[Step]:
+def steps_to(robot: Robot, frame: str, seen_from: str | None = None) -> list[ElementaryTransform]:
     """The steps from the world, or from another frame, to a frame, without joints that carry both.
     `InputError` for an unknown frame, or a joint on the way that neither turns nor slides."""
     model = robot.model
     at = model.frames[robot.frame_id(frame)]
-    steps = [Step(frame, "fixed", np.array(at.placement.translation), np.array(at.placement.rotation))]
+    steps = [
+        ElementaryTransform(
+            frame, "fixed", np.array(at.placement.translation), np.array(at.placement.rotation)
+        )
+    ]
     index = int(at.parentJoint)
     while index > 0:
         steps = joint_steps(robot, index) + steps
@@ -241,7 +247,7 @@ def steps_to(robot: Robot, frame: str, seen_from: str | None = None) -> list[Ste
     return [step._replace(backward=True) for step in reversed(other[shared:])] + steps[shared:]
 
 
-def position(steps: list[Step], geometry: Geometry) -> Vector:
+def position(steps: list[ElementaryTransform], geometry: Geometry) -> Vector:
     """The last frame's origin as seen from the first."""
     _name_lengths(steps, geometry)
     p = [geometry.ring.number(0)] * 3
@@ -250,12 +256,12 @@ def position(steps: list[Step], geometry: Geometry) -> Vector:
     return p
 
 
-def turns(steps: list[Step], geometry: Geometry) -> tuple[Turning, ...]:
+def turns(steps: list[ElementaryTransform], geometry: Geometry) -> tuple[Turning, ...]:
     """The turns whose product is the last frame's rotation in the axes of the first."""
     return merged([turn for step in steps for turn in _turns_of(step, geometry)])
 
 
-def twists(steps: list[Step], geometry: Geometry) -> dict[str, list[Expansion]]:
+def twists(steps: list[ElementaryTransform], geometry: Geometry) -> dict[str, list[Expansion]]:
     """The last frame's twist, v over ω, in its own axes, by the name of each joint on the way: v = Rᵀ (a × p)
     and ω = Rᵀ a where it turns about a."""
     ring = geometry.ring
@@ -274,13 +280,13 @@ def twists(steps: list[Step], geometry: Geometry) -> dict[str, list[Expansion]]:
     return by_joint
 
 
-def _name_lengths(steps: list[Step], geometry: Geometry) -> None:
+def _name_lengths(steps: list[ElementaryTransform], geometry: Geometry) -> None:
     """Name lengths from the root on: the order in formulas, not the one in which they are met here."""
     for step in steps:
         geometry.vector(step.translation, step.label)
 
 
-def carried(step: Step, point: Vector, geometry: Geometry) -> Vector:
+def carried(step: ElementaryTransform, point: Vector, geometry: Geometry) -> Vector:
     """A point behind a step, as seen from before it."""
     offset = geometry.vector(step.translation, step.label)
     if step.kind == "prismatic":
@@ -293,7 +299,7 @@ def carried(step: Step, point: Vector, geometry: Geometry) -> Vector:
     return [a + b for a, b in zip(turned(turning, point, geometry.ring), offset, strict=True)]
 
 
-def _turns_of(step: Step, geometry: Geometry) -> list[Turning]:
+def _turns_of(step: ElementaryTransform, geometry: Geometry) -> list[Turning]:
     if step.kind == "prismatic":
         return []
     if step.kind == "fixed":
@@ -309,7 +315,7 @@ def _turns_of(step: Step, geometry: Geometry) -> list[Turning]:
     return back(turns) if step.backward else turns
 
 
-def _axis(step: Step, geometry: Geometry) -> Vector:
+def _axis(step: ElementaryTransform, geometry: Geometry) -> Vector:
     straight, ring = signed_axis(step.axis), geometry.ring
     if straight is None:
         return turned(geometry.towards(step.axis, step.label), unit_vectors(ring)[2], ring)

@@ -9,8 +9,7 @@ import numpy as np
 from nmm.analysis.singular.jacobians import Reached
 from nmm.base.errors import InputError
 from nmm.base.kernels import records
-from nmm.base.kernels.records import Frames as Read
-from nmm.base.kernels.records import Rows
+from nmm.base.kernels.records import Frames, Rows
 from nmm.control.functions.function import Function, Stage
 from nmm.control.functions.references.circle import bearing
 from nmm.control.functions.tasks import Stack
@@ -20,7 +19,7 @@ from nmm.control.functions.tasks.pose import frame_pose, orientation_error, pose
 from nmm.control.functions.tasks.position import distance
 from nmm.model.robots.robot import CENTER_OF_MASS, Robot
 from nmm.plugins.symbolic.expansion import Expansion, exact
-from nmm.plugins.symbolic.frames import Frames, lazy, steps_to, turns, unread
+from nmm.plugins.symbolic.frames import SymbolicFrames, lazy, steps_to, turns, unread
 from nmm.plugins.symbolic.geometry import back, cross, dot, signed_axis, turned
 from nmm.plugins.symbolic.quotient import Linear, Quotient, Untraceable, quotient
 from nmm.plugins.symbolic.tracing import traced
@@ -50,7 +49,7 @@ def frames_of(functions: Iterable[Function], robot: Robot) -> list[str]:
     return [frame for frame in frames if frame != CENTER_OF_MASS]
 
 
-def task_rows(stack: Stack, frames: Frames) -> list[TracedRow]:
+def task_rows(stack: Stack, frames: SymbolicFrames) -> list[TracedRow]:
     """The rows of f, with the derivatives of f - g, from which J of eq. 13 is made."""
     rows = []
     for task in stack:
@@ -86,7 +85,7 @@ def task_rows(stack: Stack, frames: Frames) -> list[TracedRow]:
 
 
 def function_rows(
-    function: Function, frames: Frames, target: bool = False
+    function: Function, frames: SymbolicFrames, target: bool = False
 ) -> tuple[list[Value], list[list[Quotient]]]:
     """Values (s) of a function of the configuration and its derivatives by the coordinates (s, n). A target's
     values may be those of some instant. `InputError` says why its kernel has no formula."""
@@ -109,7 +108,7 @@ def function_rows(
     return values, gradients
 
 
-def _evaluated(stages: Sequence[Stage], t: float, frames: Frames) -> Rows:
+def _evaluated(stages: Sequence[Stage], t: float, frames: SymbolicFrames) -> Rows:
     n, size = frames.robot.n, max(stage.rows for stage in stages)
     rows = Rows(*(np.full(shape, 0.0, dtype=object) for shape in (size, size, (size, n))))
     for stage in stages:
@@ -124,7 +123,7 @@ def _evaluated(stages: Sequence[Stage], t: float, frames: Frames) -> Rows:
     return rows
 
 
-def _run(stage: Stage, t: float, rows: Rows, frames: Frames) -> None:
+def _run(stage: Stage, t: float, rows: Rows, frames: SymbolicFrames) -> None:
     """Call a stage's kernel: the only place that knows its arguments."""
     q = np.array(frames.coordinates(), dtype=object)
     at = records.At(t, q, unread("G", 2), unread("G's derivatives", 3))
@@ -135,7 +134,7 @@ def _run(stage: Stage, t: float, rows: Rows, frames: Frames) -> None:
     traced(stage.kernel, frames)(at, read, stage.numbers, own)
 
 
-def _value(value: Any, frames: Frames) -> Value:
+def _value(value: Any, frames: SymbolicFrames) -> Value:
     ring = frames.geometry.ring
     if isinstance(value, Arc | Turn):
         return value
@@ -152,7 +151,7 @@ def _value(value: Any, frames: Frames) -> Value:
     return ratio.over
 
 
-def _frame_pose(stage: Stage, rows: Rows, frames: Frames) -> None:
+def _frame_pose(stage: Stage, rows: Rows, frames: SymbolicFrames) -> None:
     """What the kernel `frame_pose` computes. Its rotation vector, a logarithm, stays a name, and has
     derivatives where a task compares it (see `task_rows`)."""
     geometry, ring = frames.geometry, frames.geometry.ring
@@ -169,7 +168,7 @@ def _frame_pose(stage: Stage, rows: Rows, frames: Frames) -> None:
             rows.value[row] = Turn(part - 3, frames.matrix(product), product)
 
 
-def _bearing(stage: Stage, read: Read, rows: Rows, frames: Frames) -> Read:
+def _bearing(stage: Stage, read: Frames, rows: Rows, frames: SymbolicFrames) -> Frames:
     """T - p = rho (cos g, sin g)."""
     ring, value = frames.geometry.ring, rows.value
     towards = [ring.number(exact(float(entry))) for entry in stage.numbers]
@@ -182,7 +181,7 @@ def _bearing(stage: Stage, read: Read, rows: Rows, frames: Frames) -> Read:
     return read
 
 
-def _distance(stage: Stage, read: Read, rows: Rows, frames: Frames) -> Read:
+def _distance(stage: Stage, read: Frames, rows: Rows, frames: SymbolicFrames) -> Frames:
     """d = to - p = rho (cos beta cos alpha, cos beta sin alpha, sin beta)."""
     ring, value, at = frames.geometry.ring, rows.value, frames.position(stage.frames[0])
     d = [to - p for to, p in zip(_polynomials(value, frames), at, strict=True)]
@@ -200,7 +199,7 @@ def _distance(stage: Stage, read: Read, rows: Rows, frames: Frames) -> Read:
     return read
 
 
-def _pointing(stage: Stage, read: Read, rows: Rows, frames: Frames) -> Read:
+def _pointing(stage: Stage, read: Frames, rows: Rows, frames: SymbolicFrames) -> Frames:
     """l = rho (cos alpha, sin alpha (cos beta, sin beta)) along the task's axes; kappa is alpha / sin alpha.
     All is in the frame's own axes; in others, the result would be the same."""
     ring = frames.geometry.ring
@@ -239,7 +238,7 @@ def _pointing(stage: Stage, read: Read, rows: Rows, frames: Frames) -> Read:
     )
 
 
-def _seen(stage: Stage, read: Read, rows: Rows, frames: Frames) -> Read:
+def _seen(stage: Stage, read: Frames, rows: Rows, frames: SymbolicFrames) -> Frames:
     """P = Z (xi, eta, 1) of each point, in the camera's own axes: J is the interaction matrix times the
     frame's motion."""
     ring = frames.geometry.ring
@@ -269,7 +268,7 @@ def _seen(stage: Stage, read: Read, rows: Rows, frames: Frames) -> Read:
     )
 
 
-def _polynomials(values: Any, frames: Frames) -> list[Expansion]:
+def _polynomials(values: Any, frames: SymbolicFrames) -> list[Expansion]:
     ratios = [quotient(value, frames.geometry.ring) for value in values]
     if any(ratio.under.variables() for ratio in ratios):
         raise Untraceable("it is taken of quotients")
@@ -278,7 +277,7 @@ def _polynomials(values: Any, frames: Frames) -> list[Expansion]:
 
 #: Rewrite the point in a kernel's rows by its distance rho and angles from another, which keeps formulas
 #: short; return the placements and Jacobians that the kernel then reads.
-_CHANGES: dict[Any, Callable[..., Read]] = {
+_CHANGES: dict[Any, Callable[..., Frames]] = {
     bearing: _bearing,
     distance: _distance,
     pointing: _pointing,

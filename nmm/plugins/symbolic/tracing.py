@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from nmm.plugins.symbolic.expansion import Expansion, exact
-from nmm.plugins.symbolic.frames import Frames
+from nmm.plugins.symbolic.frames import SymbolicFrames
 from nmm.plugins.symbolic.quotient import Linear, Quotient, Traced, Untraceable, quotient
 from nmm.plugins.symbolic.written import Arc
 
 
-def traced(kernel: Any, frames: Frames) -> Callable[..., Any]:
+def traced(kernel: Any, frames: SymbolicFrames) -> Callable[..., Any]:
     """A kernel's own code with `math` and `numpy` that take symbols, also in the functions that it calls;
     branches are taken as at `Ring.sample`."""
     modules = {module: _Module(module, frames) for module in (math, np)}
@@ -58,7 +58,7 @@ def _names(code: CodeType) -> Iterator[str]:
 class _Module:
     """`math` or `numpy` for numbers and for symbols."""
 
-    def __init__(self, module: ModuleType, frames: Frames) -> None:
+    def __init__(self, module: ModuleType, frames: SymbolicFrames) -> None:
         self._module = module
         self._frames = frames
 

@@ -22,7 +22,7 @@ class Undecided(Exception):
     """Not within the limits: of a Gröbner basis, or of a proof's cases."""
 
 
-class Limits(NamedTuple):
+class GroebnerLimits(NamedTuple):
     """Limits while a Gröbner basis is computed: its polynomials, their terms, and bits of coefficients."""
 
     members: int
@@ -31,10 +31,10 @@ class Limits(NamedTuple):
 
 
 #: For the sets themselves, and for the hard form of one question about them.
-_SET, _QUESTION = Limits(200, 2000, 10_000), Limits(60, 1000, 10_000)
+_SET, _QUESTION = GroebnerLimits(200, 2000, 10_000), GroebnerLimits(60, 1000, 10_000)
 
 
-class Basis:
+class GroebnerBasis:
     """A reduced Gröbner basis of integer polynomials in graded reverse lexicographic order. Variables that
     are not 0 (`nonzero`, by index) are divided out of each member: the ideal may be larger than the
     generators', with the same zeros where these are not 0."""
@@ -52,7 +52,7 @@ class Basis:
     def contains(self, polynomial: Any) -> bool:
         return not polynomial.reduction_primitive_part(self.members)
 
-    def with_more(self, generators: Iterable[Any], limits: Limits) -> Basis:
+    def with_more(self, generators: Iterable[Any], limits: GroebnerLimits) -> GroebnerBasis:
         """The basis of this ideal and more generators; `Undecided` beyond the limits."""
         ideal, more = self, [self._stripped(generator) for generator in generators if generator]
         while more:
@@ -60,7 +60,7 @@ class Basis:
             basis, finished = everything.buchberger_naive(limits=limits)
             if not finished:
                 raise Undecided
-            ideal = Basis(self.context, basis.autoreduction(), self.nonzero)
+            ideal = GroebnerBasis(self.context, basis.autoreduction(), self.nonzero)
             more = [shorter for member in ideal.members if (shorter := self._stripped(member)) != member]
         return ideal
 
@@ -81,7 +81,7 @@ class Zeros:
         self,
         products: Iterable[Product],
         nonzero: Sequence[Product],
-        limits: Limits | None = None,
+        limits: GroebnerLimits | None = None,
         zero: Sequence[Product] = (),
     ) -> None:
         all_leaves = list(leaves(*products, *nonzero, *zero))
@@ -110,21 +110,21 @@ class Zeros:
                 inverse = inverse * f
         divided = [] if inverse == 1 else [1 - w * inverse]
         vanishing = [self.polynomial(product) for product in zero]
-        whole = Basis(self._integer, (), indices)
+        whole = GroebnerBasis(self._integer, (), indices)
         self.everywhere = whole.with_more([*circles, *divided, *vanishing], self._limits)
 
-    def within(self, basis: Basis, *products: Product) -> Basis:
+    def within(self, basis: GroebnerBasis, *products: Product) -> GroebnerBasis:
         """The part of a set where more products vanish, too."""
         return basis.with_more([self.polynomial(product) for product in products], self._limits)
 
-    def contains(self, product: Product, basis: Basis) -> bool:
+    def contains(self, product: Product, basis: GroebnerBasis) -> bool:
         """Whether a product is easily seen to vanish throughout a set."""
         if product not in self._polynomials:
             self._polynomials[product] = self.polynomial(product)
         f = self._polynomials[product]
         return basis.contains(f) or basis.contains(f * f)
 
-    def vanishes(self, product: Product, basis: Basis) -> bool:
+    def vanishes(self, product: Product, basis: GroebnerBasis) -> bool:
         """Whether a product vanishes throughout a set; false also if deciding takes too long."""
         if self.contains(product, basis):
             return True

@@ -20,7 +20,7 @@ from nmm.motion.trajectory import Outcome, Trajectory
 from nmm.scenario import Scenario
 from nmm.scenario.document import document_of
 from nmm.scenario.scaffold.end_effector import Hand, HandsPath, hands, paths
-from nmm.scenario.scaffold.parts import Chosen, chosen_robot
+from nmm.scenario.scaffold.parts import ChosenRobot, chosen_robot
 from nmm.scenario.scaffold.standing import Standing, tipping
 from nmm.scenario.scaffold.start import Start, start_for
 from nmm.scenario.scaffold.text import text_of
@@ -126,7 +126,9 @@ def usual_file(source: str | Path) -> Path:
     return Path(f"{stem or 'scenario'}.yaml")
 
 
-def _scenarios(chosen: Chosen, hand: Hand, start: Start) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
+def _scenarios(
+    chosen: ChosenRobot, hand: Hand, start: Start
+) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
     """Scenarios as plain data, with a line on each key, the most wanted first."""
     robot = chosen.robot
     place = Configuration(robot, start.q).placement(hand.frame).translation
@@ -171,7 +173,7 @@ def _limits(standing: Standing, start: Start, share: float) -> tuple[dict[str, A
     return {"acceleration": standing.accelerations(start.q, share)}, about
 
 
-def _data(chosen: Chosen, hand: Hand, start: Start, path: HandsPath, kind: str) -> dict[str, Any]:
+def _data(chosen: ChosenRobot, hand: Hand, start: Start, path: HandsPath, kind: str) -> dict[str, Any]:
     robot = chosen.robot
     data: dict[str, Any] = {
         "title": f"{hand.frame} along a {path.reference['kind']}",
@@ -221,7 +223,7 @@ def _wheel_share(robot: Robot) -> float:
 
 
 def _tried(
-    data: dict[str, Any], words: dict[str, str], chosen: Chosen, hand: Hand, start: Start, file: Path
+    data: dict[str, Any], words: dict[str, str], chosen: ChosenRobot, hand: Hand, start: Start, file: Path
 ) -> Draft | NmmError:
     """The draft when its run is completed, or why it is not."""
     head = (

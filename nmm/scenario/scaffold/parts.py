@@ -26,7 +26,7 @@ _ARMS = ("lock", "srdf", "missing_meshes")
 
 
 @dataclass(frozen=True, eq=False)
-class Chosen:
+class ChosenRobot:
     """A robot, the key `robot` of its scenario, and a line on where its platform comes from."""
 
     robot: Robot
@@ -41,7 +41,7 @@ def chosen_robot(
     arm: str | None = None,
     at: str | None = None,
     **keys: Any,
-) -> Chosen:
+) -> ChosenRobot:
     """The robot of a file, with an arm on it where one is named, or on a base where it has no wheels.
 
     source and arm are bundled names, paths or package://PACKAGE/PATH; paths become relative to the scenario's
@@ -54,12 +54,12 @@ def chosen_robot(
         base = {key: value for key, value in options.items() if key not in _ARMS}
         data = _mounted(_part(source, folder, base), _part(arm, folder, own), at)
         robot, data = _loaded(data, folder)
-        return Chosen(robot, data, f"{robot.platform.name}, {_origin(robot)}")
+        return ChosenRobot(robot, data, f"{robot.platform.name}, {_origin(robot)}")
     robot, data = _loaded(_part(source, folder, options), folder)
     if provenance_of(robot).platform != "default" or not any(
         note.code == "no_wheels" for note in robot.notes
     ):
-        return Chosen(robot, data, f"{robot.platform.name}, {_origin(robot)}{_why_kept(robot)}")
+        return ChosenRobot(robot, data, f"{robot.platform.name}, {_origin(robot)}{_why_kept(robot)}")
     if not robot.q_names[robot.platform.n_p :]:
         what = "has neither wheels nor movable joints: there is nothing to lead"
         raise InputError(what, where=source)
@@ -69,7 +69,7 @@ def chosen_robot(
         f"{Path(source).name} has no wheels: it stands on the bundled {BASE}. Another base: nmm init BASE "
         "--arm FILE; none: --platform fixed; its root as a unicycle without wheels: --platform unicycle"
     )
-    return Chosen(robot, data, why)
+    return ChosenRobot(robot, data, why)
 
 
 def _why_kept(robot: Robot) -> str:

@@ -17,7 +17,7 @@ from nmm.motion.diagnosis.summary import BAND, settling_time
 from nmm.motion.trajectory import Trajectory
 from nmm.views.figures import curves, style
 from nmm.views.figures.limits import clearance, draw_scale, has_clearance, has_limits, limits
-from nmm.views.figures.motion import Scene, stroboscopic
+from nmm.views.figures.motion import MotionScene, stroboscopic
 from nmm.views.figures.objective import draw_best_objective, has_objective, longest, objective_comparison
 from nmm.views.figures.style import save_as
 from nmm.views.figures.views import Paths, draw_views
@@ -74,7 +74,7 @@ def overview(trajectory: Trajectory, *, width: float = _WIDTH) -> Figure:
     >>> len(nmm.figures.overview(run).axes)
     5
     """
-    scene, columns = Scene(trajectory), _Columns(width)
+    scene, columns = MotionScene(trajectory), _Columns(width)
     parts = curves.input_parts(trajectory)
     names = [curves.input_names(trajectory, part) for part in parts]
     limited = has_limits(trajectory)
@@ -172,7 +172,7 @@ def _name_last(panels: Sequence[Axes]) -> None:
 def _draw_norms(
     axes: Axes,
     runs: Sequence[Trajectory],
-    worn: Sequence[resolver_style.Look],
+    worn: Sequence[resolver_style.RunStyle],
     norms: Sequence[Array],
     name: str,
 ) -> None:

@@ -16,9 +16,9 @@ from nmm.base.errors import expect
 from nmm.model.robots.frame_path import FramePath
 from nmm.motion.trajectory import Trajectory
 from nmm.views.figures import style
-from nmm.views.figures.seen_points import SeenPoints
-from nmm.views.figures.silhouette import Ink, Pose, Silhouette, hull, outline_points
-from nmm.views.figures.time_labels import SIZE, Ground, Place, Subject, places
+from nmm.views.figures.seen_points import DrawnPoints
+from nmm.views.figures.silhouette import DrawnPose, Ink, Silhouette, hull, outline_points
+from nmm.views.figures.time_labels import SIZE, LabelSubject, OccupiedCells, Place, places
 from nmm.views.figures.views import ABOVE, View, Viewed, page, upright
 from nmm.views.playback.placements import base_position
 
@@ -77,10 +77,10 @@ def stroboscopic(
     >>> figure.axes[0].get_xlabel()
     'x [m]'
     """
-    return page(Scene(trajectory, instants), width)
+    return page(MotionScene(trajectory, instants), width)
 
 
-class Scene(Viewed):
+class MotionScene(Viewed):
     def __init__(self, trajectory: Trajectory, instants: ArrayLike | int | None = None) -> None:
         (self.trajectory,) = style.sampled([trajectory], "the motion")
         silhouette = Silhouette(trajectory.robot, trajectory.frame)
@@ -90,10 +90,10 @@ class Scene(Viewed):
             wanted = with_the_nearest(trajectory, wanted)
         samples = np.unique(np.searchsorted(trajectory.t, wanted - 1e-9).clip(0, len(trajectory) - 1))
         self.times = trajectory.t[samples]
-        self.poses: list[Pose] = [silhouette.at(trajectory.q[k]) for k in samples]
+        self.poses: list[DrawnPose] = [silhouette.at(trajectory.q[k]) for k in samples]
         self.lines = _lines(trajectory)
         self.outlines = outlines(trajectory, self.times)
-        self.seen = SeenPoints([trajectory], self.times)
+        self.seen = DrawnPoints([trajectory], self.times)
         self._labels: dict[float, list[Place]] = {}
         heights = np.array([[*pose.joints[:, 2], *pose.tip[:, 2]] for pose in self.poses])
         rises = heights.size > 0 and float(np.ptp(heights, axis=0).max()) > _RISES
@@ -133,8 +133,8 @@ class Scene(Viewed):
             scale = 1.1 * extent / width
             mains = [hull(view.of(pose.main)) for pose in self.poses]
             solid = [hull(view.of(outline.points)) for outline in self.outlines if outline.times]
-            subjects = [Subject(*pair) for pair in zip(self._times(), [*mains, *solid], strict=True)]
-            ground = Ground(lambda axes: self._draw_scene(axes, view), low, high, scale)
+            subjects = [LabelSubject(*pair) for pair in zip(self._times(), [*mains, *solid], strict=True)]
+            ground = OccupiedCells(lambda axes: self._draw_scene(axes, view), low, high, scale)
             for _ in range(4):
                 scale = 1.1 * extent / width
                 labels = places(subjects, ground, scale)

@@ -43,7 +43,7 @@ def laps(found: Repeatability, *, width: float = style.PAGE) -> Figure:
     return style.aligned(made)
 
 
-def _draw_drift(axes: Axes, runs: list[Laps], worn: list[resolver_style.Look]) -> None:
+def _draw_drift(axes: Axes, runs: list[Laps], worn: list[resolver_style.RunStyle]) -> None:
     drifts = [np.maximum(run.distance, LOWEST) for run in runs]
     every, longest = np.concatenate(drifts), max(map(len, drifts))
     for k, (drift, look) in enumerate(zip(drifts, worn, strict=True)):
@@ -63,7 +63,7 @@ def _draw_drift(axes: Axes, runs: list[Laps], worn: list[resolver_style.Look]) -
     style.legend(axes)
 
 
-def _draw_paths(axes: Axes, runs: list[Laps], worn: list[resolver_style.Look], width: float) -> None:
+def _draw_paths(axes: Axes, runs: list[Laps], worn: list[resolver_style.RunStyle], width: float) -> None:
     """All laps thin, the last one thick, the laps' ends as dots; a legend `width` in wide."""
     axes.set_aspect("equal", adjustable="box")
     names = iter(_path_names(runs, worn))
@@ -84,7 +84,7 @@ def _draw_paths(axes: Axes, runs: list[Laps], worn: list[resolver_style.Look], w
     style.legend(axes, width)
 
 
-def _path_names(runs: list[Laps], worn: list[resolver_style.Look]) -> list[str]:
+def _path_names(runs: list[Laps], worn: list[resolver_style.RunStyle]) -> list[str]:
     desired = [f"desired path of {runs[0].trajectory.frame}"] if _desired(runs[0]) is not None else []
     return [*desired, *(f"platform, {look.name}, last lap thick" for look in worn)]
 

@@ -16,7 +16,7 @@ _MOVING, _STANDS = "path of what is seen", "seen point"
 _RESTS = 1e-6
 
 
-class SeenPoints:
+class DrawnPoints:
     """Those of runs, each once; of several runs those that are the same in all.
 
     Attributes

@@ -53,7 +53,7 @@ class Ink:
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class DrawnPose:
     """A robot's drawing at one configuration, points (k, 3) in world axes, m: each convex shape and wheel;
     `main`, the root link's body, or all where it has no shape; `heading`, a triangle that points ahead; the
     ends of each of the arm's links, its joints, its ends."""
@@ -122,7 +122,7 @@ class Silhouette:
         self._body = platform_shapes(robot, own or [self._root])
         # How a caster stands follows from the path that it has taken, which q does not determine.
         self._wheels = [
-            Solid(joint, tyre(wheel.radius, axis(display.joints[joint], np.zeros(display.nq))))
+            HullPoints(joint, tyre(wheel.radius, axis(display.joints[joint], np.zeros(display.nq))))
             for joint, wheel in ((display.getJointId(wheel.joint), wheel) for wheel in robot.wheels)
             if not wheel.swivel or wheel.swivel in self._rolling.steered
         ]
@@ -130,7 +130,7 @@ class Silhouette:
         self._tips = _tips(robot, self._arm, frame)
         self._feet = _feet(robot, self._arm)
 
-    def at(self, q: Array) -> Pose:
+    def at(self, q: Array) -> DrawnPose:
         places = [np.eye(4), *self._placements.world(q, self._rolling.settled(q))]
 
         def world(shown: int, points: Array) -> Array:
@@ -146,7 +146,7 @@ class Silhouette:
         ends += [(world(shown[self._parents[joint]], foot), joints[joint]) for joint, foot in self._feet]
         body = [world(shown[solid.joint], solid.points) for solid in self._body]
         of_root = [part for solid, part in zip(self._body, body, strict=True) if solid.joint == self._root]
-        return Pose(
+        return DrawnPose(
             body=body,
             main=np.vstack(of_root or body),
             wheels=[world(wheel.joint, wheel.points) for wheel in self._wheels],
@@ -157,7 +157,7 @@ class Silhouette:
         )
 
 
-def _heading_mark(body: list[Solid], root: int) -> Array:
+def _heading_mark(body: list[HullPoints], root: int) -> Array:
     """A triangle on the rear half of the platform, where no arm hides it, that points along its x axis."""
     points = np.vstack([solid.points for solid in body if solid.joint == root] or [body[0].points])
     low, high = points.min(axis=0), points.max(axis=0)
@@ -211,14 +211,14 @@ _AROUND = 28
 
 
 @dataclass(frozen=True, eq=False)
-class Solid:
+class HullPoints:
     """Points (k, 3), m, whose convex hull is a shape, in the frame of joint `joint`."""
 
     joint: int
     points: Array
 
 
-def platform_shapes(robot: Robot, platform: Sequence[int]) -> list[Solid]:
+def platform_shapes(robot: Robot, platform: Sequence[int]) -> list[HullPoints]:
     """The visual shapes on the platform's joints, or else the collision shapes, or else what a page draws."""
     names = {robot.model.names[joint]: joint for joint in platform}
     visual, collision = robot.shapes
@@ -235,7 +235,7 @@ def platform_shapes(robot: Robot, platform: Sequence[int]) -> list[Solid]:
     outlines = ((shape, outline_points(shape.geometry)) for shape in shapes)
     return _outermost(
         [
-            Solid(
+            HullPoints(
                 names[model.names[shape.parentJoint]],
                 points @ np.array(shape.placement.rotation).T + np.array(shape.placement.translation),
             )
@@ -281,7 +281,7 @@ def _extremes(vertices: Array) -> Array:
     return np.asarray(vertices[np.unique(np.argmax(vertices @ directions.T, axis=0))])
 
 
-def _outermost(solids: list[Solid]) -> list[Solid]:
+def _outermost(solids: list[HullPoints]) -> list[HullPoints]:
     """The shapes without those hidden by another of the same joint from above and from the side."""
     # Lower ends with their signs changed: what a box holds is less throughout.
     boxes = [np.array([-solid.points.min(axis=0), solid.points.max(axis=0)]) for solid in solids]

@@ -20,7 +20,7 @@ from nmm.base.arrays import Array
 from nmm.base.errors import expect
 from nmm.base.figure_options import FORMATS, FigureOptions
 from nmm.base.files import written_at
-from nmm.base.resolver_style import BLACK, CYCLE, DASHES, GREEN, ORANGE, PINK, Look
+from nmm.base.resolver_style import BLACK, CYCLE, DASHES, GREEN, ORANGE, PINK, RunStyle
 from nmm.base.text_format import listed, printable, superscript
 from nmm.motion.trajectory import Trajectory
 
@@ -243,7 +243,7 @@ def curve(
     axes.plot(t, y, dashes, color=color, linewidth=width, label=name, solid_joinstyle="round")
 
 
-def compared(axes: Axes, worn: Sequence[Look], times: Sequence[Array], values: Sequence[Array]) -> None:
+def compared(axes: Axes, worn: Sequence[RunStyle], times: Sequence[Array], values: Sequence[Array]) -> None:
     """A curve for each run in its look, the later ones over the earlier."""
     for k, (look, t, y) in enumerate(zip(worn, times, values, strict=True)):
         curve(axes, t, y, *look, below=len(worn) - 1 - k)

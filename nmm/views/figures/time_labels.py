@@ -24,7 +24,7 @@ _AS_NEAR, _UNCLEAR = 0.08, 0.3
 _DIRECTIONS, _DISTANCES, _FARTHEST = 40, 24, 2.0
 
 
-class Subject(NamedTuple):
+class LabelSubject(NamedTuple):
     text: str
     outline: Array
 
@@ -50,7 +50,7 @@ class Place(NamedTuple):
         return end
 
 
-def places(subjects: Sequence[Subject], ground: Ground, scale: float) -> list[Place]:
+def places(subjects: Sequence[LabelSubject], ground: OccupiedCells, scale: float) -> list[Place]:
     """Places near the subjects, clear of the drawing (`ground`) and of each other; `scale`: m per page
     inch."""
     pad, cell = _PAD * scale, ground.cell
@@ -122,7 +122,7 @@ def _clear(middles: Array, half: Array, texts: Sequence[Place], leads: Array) ->
     return ~(touched | crossed)
 
 
-class Ground:
+class OccupiedCells:
     """The occupied cells, of side `cell`, m, of a grid around a drawing from low to high (2,), m: the pixels
     of a picture of it, at `scale` m per inch, that are not white."""
 

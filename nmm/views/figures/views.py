@@ -13,7 +13,7 @@ from nmm.base import resolver_style
 from nmm.base.arrays import Array
 from nmm.motion.trajectory import Trajectory
 from nmm.views.figures import style
-from nmm.views.figures.seen_points import SeenPoints
+from nmm.views.figures.seen_points import DrawnPoints
 from nmm.views.playback.placements import base_position
 
 #: Room for the x axis' label between two views, in, and between two ticks.
@@ -170,11 +170,11 @@ class Paths(Viewed):
 
     on_the_ground = False
 
-    def __init__(self, runs: Sequence[Trajectory], worn: Sequence[resolver_style.Look]) -> None:
+    def __init__(self, runs: Sequence[Trajectory], worn: Sequence[resolver_style.RunStyle]) -> None:
         self._worn = worn
         self._desired, self._held = runs[0].moving, runs[0].held
         self._frames = [run.frame for run in runs]
-        self._seen = SeenPoints(runs)
+        self._seen = DrawnPoints(runs)
         self._paths = [run.path for run in runs]
         self._floors = [_on_the_floor(run) for run in runs]
         risen = [path for path in (*self._paths, self._desired) if path is not None]

@@ -9,7 +9,7 @@ import numpy as np
 
 from nmm.base.arrays import Array, Integers
 from nmm.base.findings.run import line
-from nmm.base.resolver_style import DASHES, Look, pretty, rate
+from nmm.base.resolver_style import DASHES, RunStyle, pretty, rate
 from nmm.control.step.quantities import Curve, RecordedQuantity, placed
 from nmm.model.robots.motion import Motion
 from nmm.model.robots.robot import Robot
@@ -227,7 +227,7 @@ def _kept(t: Array, curves: Sequence[Array], events: Sequence[Integers]) -> Inte
     return np.unique(np.concatenate([*must, where[missed]]).astype(np.int64))
 
 
-def draw_curves(drawing: Drawing, runs: Sequence[Channels], looks: Sequence[Look], start: float) -> None:
+def draw_curves(drawing: Drawing, runs: Sequence[Channels], looks: Sequence[RunStyle], start: float) -> None:
     """Append the command "curves": each run's channels in its look; `start` is the page's first time, s."""
     lanes: dict[str, dict[str, Any]] = {}
     data = []
@@ -279,7 +279,7 @@ def draw_facts(
     drawing: Drawing,
     runs: Sequence[Motion | Trajectory],
     plotted: Sequence[Channels],
-    looks: Sequence[Look],
+    looks: Sequence[RunStyle],
     start: float,
 ) -> None:
     """Append the command "facts", unless all runs are mere motions; `start` is the page's first time, s."""

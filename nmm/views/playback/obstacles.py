@@ -14,7 +14,7 @@ from nmm.views.playback.drawing import Command, Drawing, Rgb, animation, encode,
 from nmm.views.playback.extent import shape_corners
 from nmm.views.playback.keyframes import samples_kept
 from nmm.views.playback.placements import position_and_quaternion
-from nmm.views.playback.shapes import Shape, shapes, triangles
+from nmm.views.playback.shapes import PageShape, shapes, triangles
 
 OBSTACLE: Rgb = (0.62, 0.55, 0.38)
 SCENERY: Rgb = (0.66, 0.70, 0.74)
@@ -148,7 +148,7 @@ def _same(body: Body, motion: Motion, other: Body, others: Motion) -> bool:
     return bool(same_times and np.allclose(body.places[:common], other.places[:common]))
 
 
-def _drawn(body: Body) -> list[Shape]:
+def _drawn(body: Body) -> list[PageShape]:
     return shapes(pin.GeometryObject(body.name, 0, pin.SE3(), body.geometry))
 
 

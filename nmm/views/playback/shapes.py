@@ -126,7 +126,7 @@ def _mixed(color: Sequence[float], tint: Rgb | None) -> Rgb:
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class PageShape:
     """A three.js geometry (JSON without uuid), its colour and its placement in the geometry's frame."""
 
     geometry: dict[str, Any]
@@ -134,7 +134,7 @@ class Shape:
     matrix: Array
 
 
-def shapes(geometry: pin.GeometryObject, off: float = OFF) -> list[Shape]:
+def shapes(geometry: pin.GeometryObject, off: float = OFF) -> list[PageShape]:
     """What to draw for a visual geometry, meshes off by at most that share of their size; nothing for kinds
     without a bounded surface."""
     red, green, blue, alpha = (float(c) for c in geometry.meshColor)
@@ -142,11 +142,11 @@ def shapes(geometry: pin.GeometryObject, off: float = OFF) -> list[Shape]:
     primitive = _primitive(geometry.geometry)
     if primitive is not None:
         data, matrix = primitive
-        return [Shape(data, color, matrix)]
+        return [PageShape(data, color, matrix)]
     drawn = []
     for piece in mesh_pieces(geometry, off):
         own = color if piece.color is None or geometry.overrideMaterial else piece.color
-        drawn.append(Shape(triangles(piece.vertices, piece.faces), own, np.eye(4)))
+        drawn.append(PageShape(triangles(piece.vertices, piece.faces), own, np.eye(4)))
     return drawn
 
 

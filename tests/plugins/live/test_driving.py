@@ -26,7 +26,7 @@ from nmm.base.arrays import Array
 from nmm.base.errors import InputError, ScenarioError
 from nmm.base.kinds import RESOLVERS
 from nmm.model.robots.configuration import Configuration
-from nmm.plugins.live.driving.driven import Driven, Reaching
+from nmm.plugins.live.driving.driven import Driven, TargetProgress
 from nmm.plugins.live.driving.planning import Planning
 from nmm.plugins.live.driving.session import Aim, DriveSession, Order, Pick, parsed
 from nmm.plugins.live.driving.setups import DriveSetup, RobotSetup, ScenarioSetup, Settings
@@ -219,7 +219,7 @@ def test_an_error_that_stands_is_told_and_one_that_falls_is_not() -> None:
     step = controller.evaluate(0.0, driven.q)
 
     def list_texts(norms: Callable[[float], float], *, until: float = 3.0, goal: Array = target) -> list[str]:
-        reaching, found = Reaching(), []
+        reaching, found = TargetProgress(), []
         for t in np.arange(0.0, until, 1.0 / 30.0):
             error = np.array([0.0, 0.6, 0.8]) * norms(t)
             found.append(reaching.words(controller, t, replace(step, error=error), goal))
@@ -232,7 +232,7 @@ def test_an_error_that_stands_is_told_and_one_that_falls_is_not() -> None:
     assert not any(list_texts(lambda t: 40.0 - 0.5 * t))  # a long way under limits
     assert not any(list_texts(lambda t: 0.004))  # it is there
     # What limits leave of the rate is told; a target that moves begins anew; a pause is no time.
-    limited = Reaching()
+    limited = TargetProgress()
     for t in (0.0, 1.1):
         words = limited.words(controller, t, replace(step, error=np.ones(3), scale=np.array([0.25])), target)
     assert words.endswith("limits leave 0.25 of the task's rate")

@@ -17,7 +17,7 @@ from nmm.analysis import analyse
 from nmm.cli.exit_status import status_of
 from nmm.control.functions.tasks import Pose, Position
 from nmm.model.robots.loading import load
-from nmm.plugins.symbolic.zeros import Limits
+from nmm.plugins.symbolic.zeros import GroebnerLimits
 
 Command = Callable[..., Result]
 
@@ -152,8 +152,8 @@ def test_abbreviations_are_explained_by_names_that_occur(robot: str, formulas: C
 
 
 def test_what_is_not_decided_comes_first(run: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nmm.plugins.symbolic.zeros._SET", Limits(2, 5, 100))
-    monkeypatch.setattr("nmm.plugins.symbolic.claims._BRIEF", Limits(2, 5, 100))
+    monkeypatch.setattr("nmm.plugins.symbolic.zeros._SET", GroebnerLimits(2, 5, 100))
+    monkeypatch.setattr("nmm.plugins.symbolic.claims._BRIEF", GroebnerLimits(2, 5, 100))
     out = run("unicycle_3r", "--task", "position", "--symbolic").out
     follows = out[out.index("what follows\n") :].splitlines()
     assert follows[1].startswith("  Not decided: where J loses rank, as")

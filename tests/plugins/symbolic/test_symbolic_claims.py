@@ -35,7 +35,7 @@ from nmm.control.functions.tasks import Heading, LinearCoordinates, Position
 from nmm.model.platforms import Omnidirectional
 from nmm.model.robots.loading import load
 from nmm.plugins.symbolic import SymbolicAnalysis, lower_bound, never_zero, singular_set, symbolic, vanishing
-from nmm.plugins.symbolic.zeros import Basis, Limits, Undecided, Zeros
+from nmm.plugins.symbolic.zeros import GroebnerBasis, GroebnerLimits, Undecided, Zeros
 
 Array = NDArray[np.float64]
 
@@ -239,8 +239,8 @@ def test_what_the_statements_leave_out() -> None:
 
 
 def test_what_is_not_decided_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nmm.plugins.symbolic.zeros._SET", Limits(2, 5, 100))
-    monkeypatch.setattr("nmm.plugins.symbolic.claims._BRIEF", Limits(2, 5, 100))
+    monkeypatch.setattr("nmm.plugins.symbolic.zeros._SET", GroebnerLimits(2, 5, 100))
+    monkeypatch.setattr("nmm.plugins.symbolic.claims._BRIEF", GroebnerLimits(2, 5, 100))
     claim = singular_set(made("unicycle_3r", "spatial position")[2])
     assert not claim.proved
     assert claim.statement == Finding("rank_undecided")
@@ -250,7 +250,7 @@ def test_what_is_not_decided_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_bases_are_sympys(rng: np.random.Generator) -> None:
     """Ideals of random polynomials; the same reduced basis."""
-    names, plenty = ["a", "b", "c"], Limits(1000, 1000, 10**6)
+    names, plenty = ["a", "b", "c"], GroebnerLimits(1000, 1000, 10**6)
     R, *_ = sympy.ring(names, sympy.QQ, "grevlex")
     ring = flint.fmpz_mpoly_ctx.get(names, "degrevlex")
     a, b, c = ring.gens()
@@ -262,10 +262,10 @@ def test_bases_are_sympys(rng: np.random.Generator) -> None:
             polynomial = {tuple(exponents): n for exponents, n in terms}
             generators.append(ring.from_dict(polynomial))
             same.append(R.from_dict({key: R.domain(n) for key, n in polynomial.items()}))
-        basis = Basis(ring).with_more(generators, plenty)
+        basis = GroebnerBasis(ring).with_more(generators, plenty)
         whole = sympy.polys.groebnertools.groebner(same, R)
 
-        def members(basis: Basis) -> set[Any]:
+        def members(basis: GroebnerBasis) -> set[Any]:
             return {
                 R.from_dict({key: R.domain(int(n)) for key, n in one.terms()}).monic()
                 for one in basis.members
@@ -274,7 +274,7 @@ def test_bases_are_sympys(rng: np.random.Generator) -> None:
         assert members(basis) == set(whole)
         assert basis.is_one == (whole == [1])
         trivial += basis.is_one
-        stepwise = Basis(ring)
+        stepwise = GroebnerBasis(ring)
         for generator in generators:
             stepwise = stepwise.with_more([generator], plenty)
         assert members(stepwise) == set(whole)
@@ -282,15 +282,15 @@ def test_bases_are_sympys(rng: np.random.Generator) -> None:
         assert basis.is_one or not basis.contains(ring.constant(1))
     assert 0 < trivial < 30
     with pytest.raises(Undecided):
-        Basis(ring).with_more([a**2 - b, a * c - 1], Limits(2, 1000, 10**6))
+        GroebnerBasis(ring).with_more([a**2 - b, a * c - 1], GroebnerLimits(2, 1000, 10**6))
 
 
 def test_what_is_not_zero_is_divided_out() -> None:
-    ring, plenty = flint.fmpz_mpoly_ctx.get(["a", "b", "c"], "degrevlex"), Limits(100, 100, 1000)
+    ring, plenty = flint.fmpz_mpoly_ctx.get(["a", "b", "c"], "degrevlex"), GroebnerLimits(100, 100, 1000)
     a, b, _ = ring.gens()
-    assert Basis(ring, nonzero=[0]).with_more([a * b, a * (b - 1)], plenty).is_one
-    assert not Basis(ring).with_more([a * b, a * (b - 1)], plenty).is_one
-    assert not Basis(ring, nonzero=[2]).with_more([a * b, a * (b - 1)], plenty).is_one
+    assert GroebnerBasis(ring, nonzero=[0]).with_more([a * b, a * (b - 1)], plenty).is_one
+    assert not GroebnerBasis(ring).with_more([a * b, a * (b - 1)], plenty).is_one
+    assert not GroebnerBasis(ring, nonzero=[2]).with_more([a * b, a * (b - 1)], plenty).is_one
 
 
 def test_waves_are_combinations_of_as_few_angles_as_there_can_be() -> None:

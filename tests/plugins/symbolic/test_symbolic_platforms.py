@@ -33,7 +33,7 @@ from nmm.model.robots.robot import Robot
 from nmm.plugins.symbolic import symbolic
 from nmm.plugins.symbolic.derivation import traced_G
 from nmm.plugins.symbolic.expansion import Ring
-from nmm.plugins.symbolic.frames import Frames
+from nmm.plugins.symbolic.frames import SymbolicFrames
 from nmm.plugins.symbolic.geometry import Geometry
 from nmm.plugins.symbolic.quotient import Quotient, quotient
 
@@ -88,7 +88,7 @@ def test_every_platform(name: str, rng: np.random.Generator, tmp_path: Path) -> 
 def test_derivatives_of_G_are_those_of_its_formula(name: str, tmp_path: Path) -> None:
     """What the kernel writes as G_q, against G differentiated as a formula: a second way to each of them."""
     robot = robot_on(TRACED[name], tmp_path)
-    frames = Frames(robot, Geometry(Ring(10**6), {}, taken=robot.q_names))
+    frames = SymbolicFrames(robot, Geometry(Ring(10**6), {}, taken=robot.q_names))
     G, G_q = traced_G(robot.platform, frames)
     for (i, j, k), derivative in np.ndenumerate(G_q):
         ring = frames.geometry.ring

@@ -3,7 +3,7 @@
 from nmm.control.functions.objectives.alignment import Alignment as Alignment
 from nmm.control.functions.objectives.base import CallableObjective as CallableObjective
 from nmm.control.functions.objectives.base import Objective as Objective
-from nmm.control.functions.objectives.base import Sum as Sum
+from nmm.control.functions.objectives.base import WeightedSum as WeightedSum
 from nmm.control.functions.objectives.clearance import Clearance as Clearance
 from nmm.control.functions.objectives.coordinates import JointRange as JointRange
 from nmm.control.functions.objectives.coordinates import LimitBarrier as LimitBarrier

@@ -27,7 +27,7 @@ def product(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
         rows.value_q[0, k] = rows.value_q[0, k] * b + a * rows.value_q[1, k]
 
 
-class Product(Function):
+class WeightedFunction(Function):
     """The product of two functions of one row: a term whose weight changes, usually with time; unitless."""
 
     def __init__(self, function: Function, weight: Function) -> None:
@@ -92,7 +92,7 @@ class Objective(Function):
         return Evaluation(*(sum(part[1:], part[0]) for part in parts))
 
     def __add__(self, other: Objective) -> Objective:
-        return Sum((1.0, self), (1.0, other))
+        return WeightedSum((1.0, self), (1.0, other))
 
     def __radd__(self, other: object) -> Objective:
         """So that Python's `sum` of objectives, which begins with 0, is their sum."""
@@ -101,7 +101,7 @@ class Objective(Function):
         raise InputError(where="objective", expected="an objective to add", got=other)
 
     def __mul__(self, factor: float | Function) -> Objective:
-        return Sum((factor, self))
+        return WeightedSum((factor, self))
 
     __rmul__ = __mul__
 
@@ -112,16 +112,16 @@ class Objective(Function):
         return self + -other
 
 
-class Sum(Objective):
-    """A weighted sum of objectives, or of other functions of one row: `Sum((2.0, a), (ramp, b))`. Weights are
-    numbers or functions of one row, usually of time."""
+class WeightedSum(Objective):
+    """A weighted sum of objectives, or of other functions of one row: `WeightedSum((2.0, a), (ramp, b))`.
+    Weights are numbers or functions of one row, usually of time."""
 
     def __init__(self, *terms: tuple[float | Function, Function]) -> None:
         expect(terms, "sum of objectives", "at least one")
         for _, function in terms:
             expect_kind(function, Function, "objective", "an objective to add")
         self._terms = tuple(
-            (inner, Product(part, weight))
+            (inner, WeightedFunction(part, weight))
             if isinstance(weight, Function)
             else (scalar(weight, "weight") * inner, part)
             for weight, function in terms

@@ -16,7 +16,7 @@ from nmm.control.functions.callbacks import stage
 from nmm.control.functions.function import Evaluation, Stage
 from nmm.control.functions.objectives.base import Objective
 from nmm.model.collisions.obstacle import Obstacle
-from nmm.model.collisions.rows import Rows, no_rows
+from nmm.model.collisions.rows import DistanceRows, no_rows
 from nmm.model.collisions.scene import Scene, set_up
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
@@ -129,7 +129,7 @@ class _Near:
         memory = Memory()
         memory.add(no_rows(setting.robot.n, len(setting.names)))
         self._blocks = memory.blocks()
-        self._rows = views(Rows, *self._blocks, 0)
+        self._rows = views(DistanceRows, *self._blocks, 0)
         self._roll = RollingPreview(setting.robot)
         self._ahead = (AHEAD if self._roll.rolls else 0.0) if ahead is None else ahead
 

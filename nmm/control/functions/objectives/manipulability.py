@@ -13,7 +13,7 @@ from nmm.base.kernels.compiled import clear, integer_scratch, kernel, scratch
 from nmm.base.kernels.linear_algebra import add, copied
 from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.control.functions.function import Function, Stage
-from nmm.control.functions.objectives.base import Sum
+from nmm.control.functions.objectives.base import WeightedSum
 from nmm.control.functions.objectives.jacobian import JacobianObjective, Part, contract, decomposed, shape_of
 from nmm.control.functions.references.polynomial import Constant
 from nmm.model.robots.input_weights import Weights
@@ -128,7 +128,7 @@ class InverseCondition(JacobianObjective):
         self.length = None if length is None else positive(length, "length")
 
 
-class WeightedManipulability(Sum):
+class WeightedManipulability(WeightedSum):
     """Weighted sum of the arm's manipulability and the whole robot's, α w_arm + (1 - α) w (Bayle, Fourquet,
     Renaud 2003).
 

@@ -27,7 +27,7 @@ from nmm.model.platforms.wheeled.kernel import CLOSURES, COMMON, RATES, TERMS
 
 
 @dataclass(frozen=True)
-class Body:
+class PlatformBody:
     """What coordinate 2 + number turns: the main body, or what hangs on a hitch or a steering pivot. `place`
     is the joint in the carrier's frame, m; the main body carries itself."""
 
@@ -58,19 +58,23 @@ class Bodies:
             expect_known("carrier", hitch.carrier, names, f"hitch {hitch.joint}")
         for wheel in wheels:
             expect_known("body", wheel.body, names, f"wheel {wheel.name}")
-        self.all: list[Body] = [Body(MAIN, 0, 0j)]
+        self.all: list[PlatformBody] = [PlatformBody(MAIN, 0, 0j)]
 
         def add_carried_by(carrier: int) -> None:
             name = self.all[carrier].name
             for wheel in wheels:
                 if isinstance(wheel, SteeredWheel) and wheel.body == name:
                     at = complex(wheel.x, wheel.y)
-                    pivot = Body(wheel.joint, carrier, at, wheel.lower, wheel.upper, steers=True)
+                    pivot = PlatformBody(wheel.joint, carrier, at, wheel.lower, wheel.upper, steers=True)
                     if pivot not in self.all:
                         self._add(pivot)
             for hitch in hitches:
                 if hitch.carrier == name:
-                    self._add(Body(hitch.joint, carrier, complex(hitch.x, hitch.y), hitch.lower, hitch.upper))
+                    self._add(
+                        PlatformBody(
+                            hitch.joint, carrier, complex(hitch.x, hitch.y), hitch.lower, hitch.upper
+                        )
+                    )
                     add_carried_by(len(self.all) - 1)
 
         add_carried_by(0)
@@ -79,7 +83,7 @@ class Bodies:
             what = "they carry each other, and the main body none of them"
             raise InputError(what, where=f"hitches {', '.join(left)}")
 
-    def _add(self, body: Body) -> None:
+    def _add(self, body: PlatformBody) -> None:
         if body.name in (*self.names, "x", "y"):
             what = "pivots with another place or other limits" if body.steers else "joints or coordinates"
             raise InputError(f"the name is given twice, to {what}", where=f"joint {body.name}")

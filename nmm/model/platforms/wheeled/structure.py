@@ -37,7 +37,7 @@ class Constraint:
 
 
 @dataclass
-class Followed:
+class AlignedWheel:
     """A steered wheel that two others leave one direction, with the row that keeps it there."""
 
     wheel: SteeredWheel
@@ -54,7 +54,7 @@ class Structure:
     ) -> None:
         self.bodies = bodies
         self.constraints: list[Constraint] = []
-        self.followed: list[Followed] = []
+        self.followed: list[AlignedWheel] = []
         self._n = 2 + len(bodies.all)
         self._wheels = {wheel.name: wheel for wheel in wheels}
         self._asked = (
@@ -202,7 +202,7 @@ class Structure:
         names = ", ".join(name for name, _, _ in self._asked or ()) or "of steering"
         return InputError(f"does not let the inputs {names} be chosen freely", where=f"wheel {wheel.name}")
 
-    def _follow(self, wheel: SteeredWheel) -> Followed:
+    def _follow(self, wheel: SteeredWheel) -> AlignedWheel:
         """The row that keeps the wheel's axis through the point where two others of its carrier meet."""
         others = [c for c in self.constraints if c.wheels[0].body == wheel.body]
         others = [c for c in others if getattr(c.wheels[0], "joint", None) != wheel.joint]
@@ -213,7 +213,7 @@ class Structure:
                 lines = [[axis.line(qp) / (1, 1, self._length) for axis in axes] for qp in samples]
                 if max(np.linalg.matrix_rank(pair, tol=DEPENDENT) for pair in np.array(lines)) == 2:
                     third = axis_of(self.bodies, wheel)
-                    return Followed(wheel, (a, b), Closure((axes[0], axes[1], third), self._length))
+                    return AlignedWheel(wheel, (a, b), Closure((axes[0], axes[1], third), self._length))
         if self._asked is not None:
             raise self._no_room(wheel)
         what = f"the others leave one motion, and no two of them are on {wheel.body}"

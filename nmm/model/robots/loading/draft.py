@@ -24,7 +24,7 @@ AddPairs = Callable[[pin.Model, pin.GeometryModel], None]
 
 
 @dataclass(frozen=True)
-class Options:
+class LoadOptions:
     """What `load` was asked for; see there. `add_pairs` chooses collision pairs."""
 
     platform: Platform | str | None = None
@@ -38,7 +38,7 @@ class Options:
 
 
 @dataclass(eq=False)
-class Draft:
+class RobotDraft:
     """What each pass reads and changes.
 
     source : what was read; options : what was asked for, in the draft's names
@@ -57,7 +57,7 @@ class Draft:
     wheels : those that roll, and no coordinates"""
 
     source: Source
-    options: Options
+    options: LoadOptions
     model: pin.Model = field(init=False)
     geometries: tuple[pin.GeometryModel, ...] = field(init=False)
     mimic_joints: tuple[MimicJoint, ...] = field(init=False)

@@ -25,7 +25,7 @@ class How(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Part:
+class ElementRule:
     """What becomes of an element: `how`, why, and of its attributes. Of one that is read, what is not in the
     table is noted as unknown; of others nothing is looked at.
 
@@ -41,14 +41,14 @@ class Part:
     has_finding: bool = False
 
 
-Table = Mapping[str, Part]
+Table = Mapping[str, ElementRule]
 
 
-def _read(attributes: str = "", more: Mapping[str, How] | None = None, once: bool = False) -> Part:
-    return Part(READ, "", {**dict.fromkeys(attributes.split(), How(READ)), **(more or {})}, once)
+def _read(attributes: str = "", more: Mapping[str, How] | None = None, once: bool = False) -> ElementRule:
+    return ElementRule(READ, "", {**dict.fromkeys(attributes.split(), How(READ)), **(more or {})}, once)
 
 
-def _once(attributes: str = "", more: Mapping[str, How] | None = None) -> Part:
+def _once(attributes: str = "", more: Mapping[str, How] | None = None) -> ElementRule:
     return _read(attributes, more, once=True)
 
 
@@ -67,8 +67,8 @@ _MASSES = "masses are those of <inertial>"
 _ORIGIN = _once("xyz rpy", {"quat_xyzw": How(READ, since=1)})
 _COLOURS = {
     "color": _once("rgba"),
-    "texture": Part(WITHOUT_EFFECT, "pictures draw its colour"),
-    **dict.fromkeys(("ambient", "diffuse", "specular", "emissive"), Part(WITHOUT_EFFECT, "shading")),
+    "texture": ElementRule(WITHOUT_EFFECT, "pictures draw its colour"),
+    **dict.fromkeys(("ambient", "diffuse", "specular", "emissive"), ElementRule(WITHOUT_EFFECT, "shading")),
 }
 _SHAPES = {
     "box": _read("size"),
@@ -77,12 +77,12 @@ _SHAPES = {
     "capsule": _read("radius length"),
     "mesh": _read("filename scale"),
 }
-_CONTACT = Part(WITHOUT_EFFECT, "contacts of simulators")
-_MUJOCO = Part(NOTED, "of <mujoco> in a URDF only the folder of the meshes is read")
+_CONTACT = ElementRule(WITHOUT_EFFECT, "contacts of simulators")
+_MUJOCO = ElementRule(NOTED, "of <mujoco> in a URDF only the folder of the meshes is read")
 _OF_MUJOCO = ("default", "asset", "equality", "tendon", "actuator", "sensor", "keyframe", "worldbody")
 
 
-def _below(path: str, parts: Table) -> dict[str, Part]:
+def _below(path: str, parts: Table) -> dict[str, ElementRule]:
     return {f"{path}/{tag}": part for tag, part in parts.items()}
 
 
@@ -99,13 +99,15 @@ URDF: Table = {
             "visual": _read("", _idle("name group cast_shadows")),
             "collision": _read("", _idle("name group concave")),
             "visual/material": _once("name"),
-            "collision/material": Part(WITHOUT_EFFECT, "collision shapes have no colour"),
+            "collision/material": ElementRule(WITHOUT_EFFECT, "collision shapes have no colour"),
             **dict.fromkeys(("collision/verbose", "collision/surface", "collision/contact"), _CONTACT),
             **dict.fromkeys(("contact", "surface", "max_contacts", "self_collide", "selfCollide"), _CONTACT),
-            **dict.fromkeys(("gravity", "kinematic", "audio_source"), Part(WITHOUT_EFFECT, "of simulators")),
-            "origin": Part(NOTED, _LINKS),
-            "pose": Part(NOTED, _LINKS),
-            "self_collision_checking": Part(NOTED, "collision shapes are those of <collision>"),
+            **dict.fromkeys(
+                ("gravity", "kinematic", "audio_source"), ElementRule(WITHOUT_EFFECT, "of simulators")
+            ),
+            "origin": ElementRule(NOTED, _LINKS),
+            "pose": ElementRule(NOTED, _LINKS),
+            "self_collision_checking": ElementRule(NOTED, "collision shapes are those of <collision>"),
         },
     ),
     **_below("robot/link/visual/material", _COLOURS),
@@ -131,20 +133,22 @@ URDF: Table = {
             ),
             "dynamics": _once("damping friction"),
             "mimic": _once("joint multiplier offset"),
-            "calibration": Part(WITHOUT_EFFECT, "for finding the joint's zero"),
-            "safety_controller": Part(NOTED, "soft limits, unless <limit> is as narrow", has_finding=True),
+            "calibration": ElementRule(WITHOUT_EFFECT, "for finding the joint's zero"),
+            "safety_controller": ElementRule(
+                NOTED, "soft limits, unless <limit> is as narrow", has_finding=True
+            ),
         },
     ),
     "robot/material": _read("name"),
     **_below("robot/material", _COLOURS),
-    "robot/nmm": Part(READ, attributes={"platform": How(READ)}, has_finding=True),
-    "robot/transmission": Part(WITHOUT_EFFECT, "inputs are rates of joints, not of motors"),
-    "robot/gazebo": Part(WITHOUT_EFFECT, "for Gazebo"),
-    "robot/ros2_control": Part(NOTED, "limits are those of <limit>", when=_has_bounds),
-    "robot/sensor": Part(NOTED, "sensors make no frames; a link on a fixed joint is one"),
-    "robot/frame": Part(NOTED, "no frame is made; a link on a fixed joint is one"),
-    "robot/loop_joint": Part(NOTED, "the loop stays open"),
-    "robot/collision_filter_group": Part(NOTED, "links that may touch are those of an SRDF"),
+    "robot/nmm": ElementRule(READ, attributes={"platform": How(READ)}, has_finding=True),
+    "robot/transmission": ElementRule(WITHOUT_EFFECT, "inputs are rates of joints, not of motors"),
+    "robot/gazebo": ElementRule(WITHOUT_EFFECT, "for Gazebo"),
+    "robot/ros2_control": ElementRule(NOTED, "limits are those of <limit>", when=_has_bounds),
+    "robot/sensor": ElementRule(NOTED, "sensors make no frames; a link on a fixed joint is one"),
+    "robot/frame": ElementRule(NOTED, "no frame is made; a link on a fixed joint is one"),
+    "robot/loop_joint": ElementRule(NOTED, "the loop stays open"),
+    "robot/collision_filter_group": ElementRule(NOTED, "links that may touch are those of an SRDF"),
     "robot/mujoco": _read(),
     "robot/mujoco/compiler": _read(
         "meshdir assetdir",
@@ -155,10 +159,10 @@ URDF: Table = {
             **dict.fromkeys(("inertiafromgeom", "inertiagrouprange", "settotalmass"), How(NOTED, _MASSES)),
         },
     ),
-    "robot/mujoco/contact": Part(NOTED, "links that may touch are those of an SRDF"),
+    "robot/mujoco/contact": ElementRule(NOTED, "links that may touch are those of an SRDF"),
     **dict.fromkeys(
         (f"robot/mujoco/{tag}" for tag in ("option", "size", "visual", "statistic")),
-        Part(WITHOUT_EFFECT, "for MuJoCo"),
+        ElementRule(WITHOUT_EFFECT, "for MuJoCo"),
     ),
     **{f"robot/mujoco/{tag}": _MUJOCO for tag in _OF_MUJOCO},
 }
@@ -175,11 +179,13 @@ SRDF: Table = {
     "robot/disable_collisions": _read("link1 link2", _idle("reason")),
     "robot/enable_collisions": _read("link1 link2", _idle("reason")),
     "robot/disable_default_collisions": _read("link"),
-    "robot/joint_property": Part(NOTED, "where motion_model is not the platform's", has_finding=True),
-    "robot/link_sphere_approximation": Part(NOTED, "collision shapes are the robot's own"),
-    "robot/end_effector": Part(WITHOUT_EFFECT, "tasks name their frame"),
-    "robot/rotor_params": Part(NOTED, "motors' inertia is left out"),
-    **dict.fromkeys(("robot/gripper", "robot/specificities"), Part(WITHOUT_EFFECT, "of other planners")),
+    "robot/joint_property": ElementRule(NOTED, "where motion_model is not the platform's", has_finding=True),
+    "robot/link_sphere_approximation": ElementRule(NOTED, "collision shapes are the robot's own"),
+    "robot/end_effector": ElementRule(WITHOUT_EFFECT, "tasks name their frame"),
+    "robot/rotor_params": ElementRule(NOTED, "motors' inertia is left out"),
+    **dict.fromkeys(
+        ("robot/gripper", "robot/specificities"), ElementRule(WITHOUT_EFFECT, "of other planners")
+    ),
 }
 
 
@@ -230,7 +236,7 @@ def _walk(element: Element, path: str, table: Table, minor: int) -> Iterator[tup
             met.add(below.tag)
 
 
-def _attribute(tag: str, name: str, how: How | None, part: Part, minor: int) -> _Seen | None:
+def _attribute(tag: str, name: str, how: How | None, part: ElementRule, minor: int) -> _Seen | None:
     about = {"element": tag, "attribute": name}
     if how is None:
         known = [key for key, other in part.attributes.items() if other.how == READ]

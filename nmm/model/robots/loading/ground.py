@@ -26,7 +26,7 @@ FOOTPRINT = "footprint"
 
 
 @dataclass(frozen=True)
-class Ground:
+class GroundContacts:
     """Where wheels touch the ground, m, by the wheels' joints.
     reference : the reference point's pose in the root link, m
     lowest : heights of their lowest points over it; near : what counts as one height
@@ -38,7 +38,7 @@ class Ground:
     is_seen: bool
 
     @classmethod
-    def of(cls, robot: Robot) -> Ground | None:
+    def of(cls, robot: Robot) -> GroundContacts | None:
         if not robot.wheels:
             return None
         measured = Measured(robot.model, (), robot.name)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from nmm.base.errors import RobotError, expect_kind, one_or_several
 from nmm.model.platforms import Platform, platform_by_name
-from nmm.model.robots.loading.draft import Options
+from nmm.model.robots.loading.draft import LoadOptions
 from nmm.model.robots.loading.packages import PACKAGE, package_file
 from nmm.model.robots.loading.passes import robot_from
 from nmm.model.robots.loading.source import Source, read_file, read_model, source_path
@@ -112,7 +112,7 @@ def load(
             raise RobotError(where=argument, expected=expected, got=value)
     if isinstance(srdf, str) and srdf.startswith(PACKAGE):
         srdf = package_file(srdf, folders)
-    options = Options(
+    options = LoadOptions(
         platform,
         wheels,
         lock or {},
@@ -135,7 +135,7 @@ def load(
 
 def _with_srdf(
     source: Source,
-    options: Options,
+    options: LoadOptions,
     srdf: str | Path | None,
     file: Path | None,
     folders: Sequence[str | Path],
@@ -159,6 +159,6 @@ def _with_srdf(
     return with_semantics(robot, semantics)
 
 
-def _made(source: Source, options: Options) -> Robot:
+def _made(source: Source, options: LoadOptions) -> Robot:
     robot = robot_from(source, options)
     return robot if source.mjcf is None else with_states(robot, source.mjcf.states, source.mjcf.start)

@@ -20,7 +20,7 @@ from nmm.model.robots.loading.mjcf_numbers import at, turn
 from nmm.model.robots.loading.mjcf_parts import line_in, unused
 from nmm.model.robots.loading.mjcf_reading import Dropped, Mjcf, read_mjcf
 from nmm.model.robots.loading.mjcf_states import Drives, drives_of, states_of
-from nmm.model.robots.loading.mjcf_tree import Body, Geom, Inertial, Joint, Mesh, Site
+from nmm.model.robots.loading.mjcf_tree import Geom, Inertial, Joint, Mesh, MjcfBody, Site
 from nmm.model.robots.loading.srdf_parts import Srdf
 from nmm.model.robots.loading.xml_tree import Attributes, Element
 
@@ -91,7 +91,7 @@ class _Writer:
 
     def write(self) -> None:
         """The body of the world that has joints or, where none has, all."""
-        bodies = self.mjcf.world.of(Body)
+        bodies = self.mjcf.world.of(MjcfBody)
         moving = [body for body in bodies if any(below.joints for below in body.all())]
         if len(moving) > 1:
             names = [body.name or "(unnamed)" for body in moving]
@@ -114,13 +114,13 @@ class _Writer:
         for reference in self.mjcf.references:
             self._couple(reference)
 
-    def _drop(self, parts: Sequence[Body | Geom | Site], kind: str) -> None:
+    def _drop(self, parts: Sequence[MjcfBody | Geom | Site], kind: str) -> None:
         """Things of the world that are not the robot's."""
         for part in parts:
             name = part.name or (part.kind if isinstance(part, Geom) else "(unnamed)")
             self.left_out.append(Dropped(f"{kind} {name}", part.element))
 
-    def _free(self, body: Body) -> None:
+    def _free(self, body: MjcfBody) -> None:
         """A body that moves freely, above the point on the ground that x, y and theta place."""
         free, *others = body.joints
         self.qpos.append((free.name, free))
@@ -140,7 +140,7 @@ class _Writer:
         self._connect("fixed", f"{link.get('name')}_fixed", footprint, link, above, body.element)
         self._rest(body, link)
 
-    def _body(self, body: Body, place: pin.SE3, parent: Element) -> None:
+    def _body(self, body: MjcfBody, place: pin.SE3, parent: Element) -> None:
         """A link below a body's joints, each of which turns or slides about a point of the body."""
         joints = body.joints
         for joint in joints:
@@ -154,7 +154,7 @@ class _Writer:
             self._connect("fixed", f"{link.get('name')}_fixed", parent, link, place, body.element)
         self._rest(body, link)
 
-    def _rest(self, body: Body, link: Element) -> None:
+    def _rest(self, body: MjcfBody, link: Element) -> None:
         """A body's mass, its shapes and sites, and the bodies on it."""
         _write_inertia(link, self.masses.of(body), body.element)
         geoms = body.of(Geom)
@@ -165,10 +165,10 @@ class _Writer:
             if site.name:
                 frame = self._link(site.name)
                 self._connect("fixed", f"{frame.get('name')}_site", link, frame, site.place, site.element)
-        for below in body.of(Body):
+        for below in body.of(MjcfBody):
             self._body(below, below.place, link)
 
-    def _link(self, wanted: str, body: Body | None = None) -> Element:
+    def _link(self, wanted: str, body: MjcfBody | None = None) -> Element:
         """A new link with a body's name or, without, with one like `wanted` that no other has."""
         name = (body.name if body else "") or _new_name(wanted, self._links)
         return _add(self.robot, "link", body.element if body else None, name=name)
@@ -262,7 +262,7 @@ class _Writer:
                 _add(material, "color", geom.element, rgba=geom.rgba)
 
 
-def _is_free(body: Body) -> bool:
+def _is_free(body: MjcfBody) -> bool:
     return any(joint.kind == "free" for joint in body.joints)
 
 

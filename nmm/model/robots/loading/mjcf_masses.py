@@ -13,7 +13,7 @@ import pinocchio as pin
 from nmm.base.arrays import Array
 from nmm.model.robots.loading.mjcf_numbers import Numbers
 from nmm.model.robots.loading.mjcf_reading import Dropped, Mjcf
-from nmm.model.robots.loading.mjcf_tree import Body, Geom, Inertial, Mesh
+from nmm.model.robots.loading.mjcf_tree import Geom, Inertial, Mesh, MjcfBody
 from nmm.model.robots.loading.xml_tree import Attributes, Element
 from nmm.model.robots.mesh_files import mesh_arrays
 
@@ -25,7 +25,7 @@ _THOMSEN = 1.6075
 _NO_MASS = 1e-15
 
 
-class Solid(NamedTuple):
+class VolumeMoments(NamedTuple):
     """volume : m³, or m² of a shell
     center : (3,), m
     moments : (3, 3), about the centre, for each unit of volume"""
@@ -60,10 +60,10 @@ class Masses:
         self._scale = 1.0
         total = self._numbers.number(compiler, "settotalmass", -1.0)
         if total > 0.0:
-            bodies = [body for top in mjcf.world.of(Body) for body in top.all()]
+            bodies = [body for top in mjcf.world.of(MjcfBody) for body in top.all()]
             self._scale = total / max(sum(self.of(body).mass for body in bodies), _NO_MASS)
 
-    def of(self, body: Body) -> pin.Inertia:
+    def of(self, body: MjcfBody) -> pin.Inertia:
         """The body's own inertia, in its axes; of no mass where the file says none."""
         inertial: Inertial | None = next(iter(body.of(Inertial)), None)
         from_geoms = self._settings.get("inertiafromgeom", "auto")
@@ -76,7 +76,7 @@ class Masses:
             inertia = pin.Inertia.Zero()
         return self._bounded(inertia)
 
-    def _of_geoms(self, body: Body) -> pin.Inertia:
+    def _of_geoms(self, body: MjcfBody) -> pin.Inertia:
         total = pin.Inertia.Zero()
         for geom in body.of(Geom):
             if geom.group not in self._groups or geom.mass == 0.0:
@@ -107,11 +107,11 @@ class Masses:
             self._scale * max(inertia.mass, mass), np.array(inertia.lever), self._scale * moments
         )
 
-    def solid(self, geom: Geom) -> Solid | None:
+    def solid(self, geom: Geom) -> VolumeMoments | None:
         """A geom's volume, or its surface, in its own axes; None for a mesh that cannot be read."""
         mesh = None if geom.mesh is None else self.of_mesh(geom.mesh)
         if geom.kind in ("plane", "hfield"):
-            return Solid(0.0, np.zeros(3), np.zeros((3, 3)))
+            return VolumeMoments(0.0, np.zeros(3), np.zeros((3, 3)))
         if geom.kind in ("mesh", "sdf"):
             return mesh
         size, center, axes = geom.size, np.zeros(3), np.eye(3)
@@ -120,9 +120,9 @@ class Masses:
                 return None
             size, center, axes = fitted(geom, mesh), mesh.center, mesh.axes
         volume, moments = _plain(geom.kind, size, geom.shell)
-        return Solid(volume, center, axes @ np.diag(moments) @ axes.T)
+        return VolumeMoments(volume, center, axes @ np.diag(moments) @ axes.T)
 
-    def of_mesh(self, mesh: Mesh) -> Solid | None:
+    def of_mesh(self, mesh: Mesh) -> VolumeMoments | None:
         """A mesh as it stands in its geom."""
         file, element = self._folder / mesh.file, mesh.element
         try:
@@ -140,7 +140,7 @@ class Masses:
         return _weighed(placed, faces, mesh.inertia)
 
 
-def fitted(geom: Geom, mesh: Solid) -> Array:
+def fitted(geom: Geom, mesh: VolumeMoments) -> Array:
     """MuJoCo's size (3,) of a plain shape that stands for a mesh: that of the box with the mesh's moments."""
     a, b, c = mesh.box
     radius = 0.5 * (a + b)
@@ -220,7 +220,7 @@ def _hull(vertices: Array) -> tuple[Array, np.ndarray]:
     return np.array(hull.vertices), np.array(hull.faces)
 
 
-def _weighed(vertices: Array, faces: np.ndarray, how: str) -> Solid:
+def _weighed(vertices: Array, faces: np.ndarray, how: str) -> VolumeMoments:
     """By the tetrahedra from the surface's centroid to each face: "exact"; "convex", of the hull; "shell", by
     the faces alone; "legacy", where all volumes are positive, once more from the centre of mass."""
     if how == "convex":
@@ -238,10 +238,10 @@ def _weighed(vertices: Array, faces: np.ndarray, how: str) -> Solid:
     again = _of_tetrahedra(corners, crossed, solid.center, True)
     off = again.center - solid.center  # the moments stay those about the first centre
     moments = again.moments + (off @ off * np.eye(3) - np.outer(off, off))
-    return Solid(again.volume, solid.center, moments)
+    return VolumeMoments(again.volume, solid.center, moments)
 
 
-def _of_tetrahedra(corners: Array, crossed: Array, apex: Array, positive: bool) -> Solid:
+def _of_tetrahedra(corners: Array, crossed: Array, apex: Array, positive: bool) -> VolumeMoments:
     volumes = np.einsum("ij,ij->i", corners[:, 0] - apex, crossed) / 6.0
     tips = np.zeros((len(corners), 1, 3))
     return _summed(
@@ -252,7 +252,7 @@ def _of_tetrahedra(corners: Array, crossed: Array, apex: Array, positive: bool) 
     )
 
 
-def _summed(weights: Array, corners: Array, origin: Array, share: float) -> Solid:
+def _summed(weights: Array, corners: Array, origin: Array, share: float) -> VolumeMoments:
     """Of simplices with weights (m,) and corners (m, k, 3) about an origin (3,); the second moment of one is
     its corners' and their sum's, each with itself, over `share`."""
     total = float(weights.sum())
@@ -263,4 +263,4 @@ def _summed(weights: Array, corners: Array, origin: Array, share: float) -> Soli
         "i,ij,il->jl", weights, sums, sums
     )
     second = second / share / whole - np.outer(center, center)
-    return Solid(total, origin + center, np.trace(second) * np.eye(3) - second)
+    return VolumeMoments(total, origin + center, np.trace(second) * np.eye(3) - second)

@@ -12,7 +12,7 @@ from nmm.model.robots.loading.xml_tree import Element
 How = Literal["read", "noted", "without effect"]
 
 
-class Row(NamedTuple):
+class MjcfElementRule(NamedTuple):
     """How an element is taken, and why. All attributes of one that is not read go with it; of one that is,
     each is in `attributes`, or means the same in all elements (`EVERYWHERE`)."""
 
@@ -29,19 +29,21 @@ def _table(read: str = "", noted: str = "", unused: str = "") -> dict[str, How]:
     }
 
 
-def _read(why: str, read: str = "", noted: str = "", unused: str = "") -> Row:
-    return Row("read", why, _table(read, noted, unused))
+def _read(why: str, read: str = "", noted: str = "", unused: str = "") -> MjcfElementRule:
+    return MjcfElementRule("read", why, _table(read, noted, unused))
 
 
-_PICTURES = Row("without effect", "pictures of a simulation")
-_SOLVER = Row("without effect", "how a simulation solves and steps")
-_OWN = Row("without effect", "data of the file's own")
-_ABOVE = Row("without effect", "goes with the element around it")
-_SOFT = Row("noted", "soft bodies are no links")
-_HOLDS = Row("noted", "only a joint that follows another is held to anything beside the tree")
-_TENDON = Row("noted", "tendons couple no joints")
-_PLUGIN = Row("noted", "what a plugin does is not known")
-_OTHER_ACTUATOR = Row("noted", "limits are those of motors, position and velocity actuators on one joint")
+_PICTURES = MjcfElementRule("without effect", "pictures of a simulation")
+_SOLVER = MjcfElementRule("without effect", "how a simulation solves and steps")
+_OWN = MjcfElementRule("without effect", "data of the file's own")
+_ABOVE = MjcfElementRule("without effect", "goes with the element around it")
+_SOFT = MjcfElementRule("noted", "soft bodies are no links")
+_HOLDS = MjcfElementRule("noted", "only a joint that follows another is held to anything beside the tree")
+_TENDON = MjcfElementRule("noted", "tendons couple no joints")
+_PLUGIN = MjcfElementRule("noted", "what a plugin does is not known")
+_OTHER_ACTUATOR = MjcfElementRule(
+    "noted", "limits are those of motors, position and velocity actuators on one joint"
+)
 _ON_JOINT = (
     "joint gear ctrlrange ctrllimited forcerange forcelimited",
     "tendon site body jointinparent slidersite",
@@ -59,7 +61,7 @@ EVERYWHERE: Mapping[str, How] = _table(
 
 #: By the path below <mujoco>. `body` also stands for <worldbody>, <frame> and <replicate>, whose contents are
 #: a body's, and `*` for all elements that are not named before it.
-ELEMENTS: Mapping[str, Row] = {
+ELEMENTS: Mapping[str, MjcfElementRule] = {
     "": _read("the robot's name", "model"),
     "include": _read("a file beside the main one, else beside the one that includes it", "file"),
     "compiler": _read(
@@ -130,13 +132,13 @@ ELEMENTS: Mapping[str, Row] = {
     "body/light": _PICTURES,
     "body/plugin": _PLUGIN,
     "body/flexcomp": _SOFT,
-    "body/composite": Row("noted", "refused, as by MuJoCo 4"),
+    "body/composite": MjcfElementRule("noted", "refused, as by MuJoCo 4"),
     "deformable": _ABOVE,
     "deformable/flex": _SOFT,
     "deformable/skin": _PICTURES,
     "contact": _read("which links may touch"),
     "contact/exclude": _read("two links that may touch", "body1 body2"),
-    "contact/pair": Row("noted", "which shapes collide is taken from the shapes alone"),
+    "contact/pair": MjcfElementRule("noted", "which shapes collide is taken from the shapes alone"),
     "tendon": _ABOVE,
     "tendon/*": _TENDON,
     "equality": _read("joints that follow others", "active"),
@@ -165,7 +167,7 @@ _BODIES = ("worldbody", "body", "frame", "replicate")
 _ATTRIBUTE = "is not taken"
 
 
-def row_of(path: str) -> tuple[str, Row] | None:
+def row_of(path: str) -> tuple[str, MjcfElementRule] | None:
     """The row of an element by its path, and the path under which it is in the table."""
     if path in ELEMENTS:
         return path, ELEMENTS[path]
@@ -179,7 +181,7 @@ def row_of(path: str) -> tuple[str, Row] | None:
     return None
 
 
-def how_of(row: Row, attribute: str) -> How | None:
+def how_of(row: MjcfElementRule, attribute: str) -> How | None:
     """What becomes of an attribute of an element; None for one that the table does not know."""
     if row.how != "read":
         return "without effect"  # it goes with its element
@@ -227,7 +229,7 @@ def _walk(element: Element, path: str) -> Iterator[tuple[str, str, Element]]:
         yield from _walk(part, _below(path, element.tag, part.tag))
 
 
-def _of_class(tag: str) -> tuple[str, Row]:
+def _of_class(tag: str) -> tuple[str, MjcfElementRule]:
     """The row of an element of a class: that of the elements to which it gives attributes."""
     paths = (*(f"{base}/{tag}" for base in ("body", "asset", "contact", "actuator")), tag)
     path = next((path for path in paths if path in ELEMENTS), "asset/*" if tag == "texture" else "actuator/*")

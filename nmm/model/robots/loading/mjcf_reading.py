@@ -12,7 +12,7 @@ from nmm.model.robots.loading.budget import MOST_LINKS
 from nmm.model.robots.loading.mjcf_elements import Elements
 from nmm.model.robots.loading.mjcf_files import include, inside, parsed
 from nmm.model.robots.loading.mjcf_numbers import ORIGIN, ROTATIONS, Numbers, at
-from nmm.model.robots.loading.mjcf_tree import Body, Part, moved, names_in, renamed
+from nmm.model.robots.loading.mjcf_tree import MjcfBody, Part, moved, names_in, renamed
 from nmm.model.robots.loading.xml_tree import Attributes, Element, children
 
 #: What is asked of <compiler>: what stands without it, and what is understood.
@@ -67,7 +67,7 @@ class Mjcf:
 
     name: str
     settings: dict[str, str]
-    world: Body
+    world: MjcfBody
     references: list[Element] = field(default_factory=list)
     keys: list[Element] = field(default_factory=list)
     left_out: list[Dropped] = field(default_factory=list)
@@ -82,7 +82,7 @@ def read_mjcf(root: Element, file: Path, faults: Attributes) -> Mjcf:
     parts = [*model.contents(world, "main")]
     keys = [key for section in children(root, "keyframe") for key in inside(section)]
     name = root.get("model") or file.stem
-    body = Body(world, "world", pin.SE3.Identity(), parts)
+    body = MjcfBody(world, "world", pin.SE3.Identity(), parts)
     return Mjcf(name, model.settings, body, model.references, keys, model.left_out)
 
 
@@ -168,7 +168,7 @@ class _Model:
                     yield from self._attach(element)
                 case "body":
                     own = [*self.contents(element, childclass)]
-                    yield Body(element, element.get("name", ""), self._numbers.place(element), own)
+                    yield MjcfBody(element, element.get("name", ""), self._numbers.place(element), own)
                 case "joint" | "freejoint":
                     yield self._elements.joint(self._with_defaults(element, childclass))
                 case "geom":

@@ -84,7 +84,7 @@ class Inertial:
 
 
 @dataclass(frozen=True)
-class Body:
+class MjcfBody:
     element: Element
     name: str
     place: pin.SE3
@@ -94,10 +94,10 @@ class Body:
         """The parts of one kind, in the file's order."""
         return [part for part in self.parts if isinstance(part, kind)]
 
-    def all(self) -> "Iterator[Body]":
+    def all(self) -> "Iterator[MjcfBody]":
         """The body and all below it, depth first as MuJoCo counts them."""
         yield self
-        for below in self.of(Body):
+        for below in self.of(MjcfBody):
             yield from below.all()
 
     @property
@@ -105,7 +105,7 @@ class Body:
         return self.of(Joint)
 
 
-Part = Body | Joint | Geom | Site | Inertial
+Part = MjcfBody | Joint | Geom | Site | Inertial
 
 
 def moved(part: Part, by: pin.SE3) -> Part:
@@ -120,7 +120,7 @@ def renamed(part: Part, rename: Rename) -> Part:
     if isinstance(part, Inertial):
         return part
     name = part.name and rename(type(part).__name__.lower(), part.name)
-    if isinstance(part, Body):
+    if isinstance(part, MjcfBody):
         return replace(part, name=name, parts=[renamed(child, rename) for child in part.parts])
     return replace(part, name=name)
 
@@ -131,6 +131,6 @@ def names_in(parts: list[Part]) -> set[tuple[str, str]]:
     for part in parts:
         if not isinstance(part, Inertial) and part.name:
             names.add((type(part).__name__.lower(), part.name))
-        if isinstance(part, Body):
+        if isinstance(part, MjcfBody):
             names |= names_in(part.parts)
     return names

@@ -17,7 +17,7 @@ from nmm.base.errors import InputError, RobotError, expect_known, few
 from nmm.base.findings import Finding
 from nmm.model.platforms import FixedBase
 from nmm.model.robots.loading.chain import CHAIN, rebuild
-from nmm.model.robots.loading.draft import Options
+from nmm.model.robots.loading.draft import LoadOptions
 from nmm.model.robots.loading.load import load
 from nmm.model.robots.loading.locking import add_pairs, told_apart
 from nmm.model.robots.loading.passes import robot_from
@@ -145,7 +145,7 @@ def _mounted(
         add_pairs(model, geometry, count)
 
     wheels = {wheel.joint: wheel.radius for wheel in base.wheels}
-    robot = robot_from(source, Options(base.platform, wheels, add_pairs=pairs))
+    robot = robot_from(source, LoadOptions(base.platform, wheels, add_pairs=pairs))
     own = {key: getattr(provenance, key) for key in ("locked", "mimicked", "platform")}
     new_parts = replace(robot.parts, provenance=replace(robot.parts.provenance, **own))
     semantics = base.semantics.with_arm(arm.semantics, prefix, joints)

@@ -13,7 +13,7 @@ from nmm.model.platforms.recognition import AT_ROOT
 from nmm.model.platforms.wheel_layout import MAIN_BODY, standing_wheels, wheels_on
 from nmm.model.robots.loading.chain import CHAIN, joint_notes, yaw_of
 from nmm.model.robots.loading.check import RESERVED
-from nmm.model.robots.loading.draft import Draft, Options
+from nmm.model.robots.loading.draft import LoadOptions, RobotDraft
 from nmm.model.robots.loading.ground import slip_warnings
 from nmm.model.robots.loading.locking import add_pairs, among_coordinates, at_zero, limit_notes, locked_values
 from nmm.model.robots.loading.measured_joints import speed_limit
@@ -27,16 +27,16 @@ from nmm.model.robots.loading.wheel_search import find_undercarriage
 from nmm.model.robots.robot import Robot
 
 
-def robot_from(source: Source, options: Options) -> Robot:
+def robot_from(source: Source, options: LoadOptions) -> Robot:
     """`RobotError` for an unusable joint, an unknown joint or frame, a platform that does not fit, wheels
     that leave open how they drive."""
-    draft = Draft(source, options)
+    draft = RobotDraft(source, options)
     for change in PASSES:
         change(draft)
     return _finished(draft)
 
 
-def _free_names(draft: Draft) -> None:
+def _free_names(draft: RobotDraft) -> None:
     """Joints and links give way where they have the names of a platform's coordinates."""
     if draft.source.on_chain:
         return
@@ -49,14 +49,14 @@ def _free_names(draft: Draft) -> None:
     draft.rename_options(draft.names)
 
 
-def _put_on_chain(draft: Draft) -> None:
+def _put_on_chain(draft: RobotDraft) -> None:
     """x, y and theta come first, and every joint has one number."""
     draft.notes += joint_notes(draft.model)
     draft.rebuild()
     draft.model.name = draft.options.name or draft.source.name
 
 
-def _lock(draft: Draft) -> None:
+def _lock(draft: RobotDraft) -> None:
     """The joints of `lock` stand still."""
     own = draft.stated_joints
     draft.locked = locked_values(draft.model, draft.options.lock, draft.mimic_joints, own, draft.where)
@@ -66,7 +66,7 @@ def _lock(draft: Draft) -> None:
     draft.notes += followers
 
 
-def _find_base(draft: Draft) -> None:
+def _find_base(draft: RobotDraft) -> None:
     """Joints that move the whole robot give way to x, y and theta, which count from where these have it; of a
     gantry they are coordinates, on a fixed base."""
     base, slides = find_virtual_base(draft.model, draft.where), gantry(draft.model, draft.where)
@@ -81,14 +81,14 @@ def _find_base(draft: Draft) -> None:
         draft.rebuild(root=base.place.inverse())
 
 
-def _hold_undercarriage(draft: Draft) -> None:
+def _hold_undercarriage(draft: RobotDraft) -> None:
     """What is between the base and its wheels stands still."""
     draft.undercarriage = find_undercarriage(draft.measured(), draft.options.wheels, draft.stated_joints)
     draft.notes += draft.hold(draft.undercarriage.held)
     draft.remarks += draft.undercarriage.notes()
 
 
-def _choose_platform(draft: Draft) -> None:
+def _choose_platform(draft: RobotDraft) -> None:
     """The platform is chosen and measured; x, y and theta are those of its reference point."""
     if draft.options.axle is not None:
         _move_reference(draft, axle_placement(draft.model, draft.options.axle, draft.where))
@@ -102,14 +102,14 @@ def _choose_platform(draft: Draft) -> None:
             raise error.at(draft.where, RobotError) from None
 
 
-def _move_reference(draft: Draft, placement: pin.SE3) -> None:
+def _move_reference(draft: RobotDraft, placement: pin.SE3) -> None:
     """The coordinates become those of the point and x axis of `placement`, in the root link."""
     draft.rebuild(root=placement.inverse())
     reached = {"at": (placement.translation + 0.0).tolist(), "yaw": yaw_of(placement)}
     draft.notes.append(Finding("reference_moved", reached))
 
 
-def _turn_joints_up(draft: Draft) -> None:
+def _turn_joints_up(draft: RobotDraft) -> None:
     """The platform's own joints whose axes point down get them upwards: their angles count to the left."""
     measured = draft.measured()
     own = [name for name in draft.platform.coordinates[len(CHAIN) :] if name in measured.joints]
@@ -120,7 +120,7 @@ def _turn_joints_up(draft: Draft) -> None:
         draft.mimic_joints = tuple(mimic.reversed(down) for mimic in draft.mimic_joints)
 
 
-def _tell_base(draft: Draft) -> None:
+def _tell_base(draft: RobotDraft) -> None:
     """The platform takes over limits of joints in whose place it is; these are told by the file's names."""
     if draft.gantry:
         draft.remarks.append(Finding("gantry", {"names": [*draft.gantry]}))
@@ -131,12 +131,12 @@ def _tell_base(draft: Draft) -> None:
         draft.remarks += renamed_findings([draft.base.note(draft.platform)], of_base)
 
 
-def _chain_names(draft: Draft) -> dict[str, str]:
+def _chain_names(draft: RobotDraft) -> dict[str, str]:
     """The file's names by the new ones, of what was called x, y or theta."""
     return {new: old for old, new in draft.names.items() if old in CHAIN}
 
 
-def _add_joint(draft: Draft) -> None:
+def _add_joint(draft: RobotDraft) -> None:
     """A joint of the platform's that the file lacks is added."""
     added = None if draft.layout is None else draft.platform.added_joint(draft.layout)
     if added is None:
@@ -166,7 +166,7 @@ def _narrow(model: pin.Model, added: AddedJoint) -> None:
     model.velocityLimit[joint.idx_v] = min(speed_limit(model, model.getJointId(added.joint)), added.velocity)
 
 
-def _put_on_platform(draft: Draft) -> None:
+def _put_on_platform(draft: RobotDraft) -> None:
     """The platform's own joints come before the arm's; a fixed base stands in the world."""
     own = draft.platform.coordinates[len(CHAIN) :]
     joints = [str(name) for name in draft.model.names][len(CHAIN) + 1 :]
@@ -184,7 +184,7 @@ def _put_on_platform(draft: Draft) -> None:
         draft.rebuild(root=stands * draft.model.jointPlacements[1], head=())
 
 
-def _hold_idle_parts(draft: Draft) -> None:
+def _hold_idle_parts(draft: RobotDraft) -> None:
     """A fixed base's wheels stand still, and its joints may be called x, y and theta; on a platform that
     moves, what steers without a wheel's joint stands still, and wheels whose size nothing tells."""
     if draft.layout is None:
@@ -206,7 +206,7 @@ def _hold_idle_parts(draft: Draft) -> None:
     draft.remarks += [Finding("radius_unknown", {"names": [*unknown]})] if unknown else []
 
 
-def _free_input_names(draft: Draft) -> None:
+def _free_input_names(draft: RobotDraft) -> None:
     """Joints give way where they have the names of the platform's inputs; what is called otherwise than in
     the file is told, but for joints in whose place the platform is."""
     like_inputs = joints_among(draft.model, draft.platform.inputs)
@@ -218,7 +218,7 @@ def _free_input_names(draft: Draft) -> None:
     draft.remarks += [Finding("names_taken", {"names": names})] if names else []
 
 
-def _find_wheels(draft: Draft) -> None:
+def _find_wheels(draft: RobotDraft) -> None:
     """Which joints are wheels, which will be no coordinates."""
     if draft.layout is None:
         return
@@ -237,7 +237,7 @@ def _find_wheels(draft: Draft) -> None:
     draft.wheel_notes += notes
 
 
-PASSES: tuple[Callable[[Draft], None], ...] = (
+PASSES: tuple[Callable[[RobotDraft], None], ...] = (
     _free_names,
     _put_on_chain,
     _lock,
@@ -254,7 +254,7 @@ PASSES: tuple[Callable[[Draft], None], ...] = (
 )
 
 
-def _finished(draft: Draft) -> Robot:
+def _finished(draft: RobotDraft) -> Robot:
     """The draft's robot, with its wheels on the display model only."""
     source, platform = draft.source, draft.platform
     shown, solid = draft.geometries

@@ -10,7 +10,7 @@ from nmm.base.findings import Finding
 from nmm.model.platforms import FixedBase, Layout, Platform, platform_by_name
 from nmm.model.platforms.recognition import AT_ROOT, Pose, recognized, reference_of
 from nmm.model.robots.loading.chain import CHAIN, yaw_of
-from nmm.model.robots.loading.draft import Draft
+from nmm.model.robots.loading.draft import RobotDraft
 from nmm.model.robots.loading.measured_joints import Measured
 from nmm.model.robots.loading.measured_layout import measure_layout
 from nmm.model.robots.loading.passive_wheels import differing_radii, differing_tyres
@@ -19,7 +19,7 @@ from nmm.model.robots.loading.passive_wheels import differing_radii, differing_t
 _LEVEL = 1e-3
 
 
-def choose_platform(draft: Draft) -> Pose:
+def choose_platform(draft: RobotDraft) -> Pose:
     """Choose and measure the draft's platform; returns where its reference point is in the root link.
     `RobotError` for one that does not fit, and wheels that leave open how they drive."""
     options, kind = draft.options, draft.asked_platform
@@ -47,7 +47,7 @@ def choose_platform(draft: Draft) -> Pose:
     return reference
 
 
-def _recognized_kind(draft: Draft, measured: Measured, layout: Layout) -> str:
+def _recognized_kind(draft: RobotDraft, measured: Measured, layout: Layout) -> str:
     """The kind of platform that the file's wheels or a base of joints tell, or the usual one."""
     by_wheels = recognized(layout)
     draft.remarks += by_wheels.notes

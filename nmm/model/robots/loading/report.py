@@ -15,7 +15,7 @@ from nmm.base.text_format import counted, one_line
 from nmm.model.robots.loading.check import inspect
 from nmm.model.robots.loading.check_parts import advice
 from nmm.model.robots.loading.description import Description, argument_texts, describe, expand
-from nmm.model.robots.loading.ground import Ground, wheel_advice
+from nmm.model.robots.loading.ground import GroundContacts, wheel_advice
 from nmm.model.robots.loading.load import load
 from nmm.model.robots.loading.locking import limit_notes
 from nmm.model.robots.loading.packages import Packages
@@ -135,7 +135,7 @@ def _report(
         warnings += advice(root)
         robot, problems = _loaded(description.path, settings)
     if robot is not None:
-        top, ground = _top(root), Ground.of(robot) if robot.platform.coordinates else None
+        top, ground = _top(root), GroundContacts.of(robot) if robot.platform.coordinates else None
         warnings += [note for note in robot.notes if note.code == "names_taken"]
         warnings += [*wheel_advice(robot), *limit_notes(robot), *acceleration_notes(robot)]
         warnings += [*provenance_of(robot).contradictions, *robot.semantics.notes]

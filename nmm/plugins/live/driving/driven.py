@@ -29,7 +29,7 @@ NEAR = 5e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class DrivenState:
     """The robot at t, s since the beginning: the controller's step (error and r_d of all tasks, NaN while one
     is inactive), σ_min of J, the frames of the tasks and things (targets, 3), m in the world, NaN for those
     without one, and what keeps it from its targets ("" if nothing does)."""
@@ -41,7 +41,7 @@ class Look:
     against: str
 
 
-class Reaching:
+class TargetProgress:
     def __init__(self) -> None:
         self._target = np.zeros(0)
         self._norms: deque[tuple[float, float]] = deque()
@@ -70,7 +70,7 @@ class Reaching:
         return stands if seen is None else f"{stands}; {seen}"
 
 
-class Made(NamedTuple):
+class PendingController(NamedTuple):
     settings: Settings
     controller: Controller
     choices: list[Choice]
@@ -99,7 +99,7 @@ class Driven:
         self._began = [target.signal.value for target in self.targets]
         self._things = Things(first)
         self.reacting = self._led = self._aimed(first)
-        self._reaching = Reaching()
+        self._reaching = TargetProgress()
         self.choices = setup.choices({})
         self.trouble = ""
         self.shown = RolledRobot(self.robot, setup.q0)
@@ -173,14 +173,14 @@ class Driven:
         for number, task in enumerate(self.reacting.given.task):
             self.aim(number, evaluate(task.function, 0.0, configuration).value)
 
-    def with_choice(self, key: str, value: object) -> Made:
+    def with_choice(self, key: str, value: object) -> PendingController:
         """A controller with that choice, for `use`; made apart, as it may take longer than a step. `NmmError`
         for an unknown choice or value, or ones that do not go together."""
         settings = {**self._settings, key: named(self.choices, key).checked(value)}
         controller = self._aimed(self.setup.controller(settings))
-        return Made(settings, controller, self.setup.choices(settings))
+        return PendingController(settings, controller, self.setup.choices(settings))
 
-    def use(self, made: Made) -> None:
+    def use(self, made: PendingController) -> None:
         """Go on with another controller, from this one's inputs."""
         self._settings, self.reacting, self.choices = made
         self.lead(None)
@@ -207,7 +207,7 @@ class Driven:
         schedule = self.reacting.schedule
         return (True,) * len(self.targets) if schedule is None else schedule.moment.active
 
-    def look(self) -> Look:
+    def look(self) -> DrivenState:
         """The present place and what the controller finds there; wheels have rolled since the last look."""
         self.shown.roll(self.q[np.newaxis])
         step = self.reacting.evaluate(self.t, self.q)
@@ -235,4 +235,4 @@ class Driven:
         every = np.full((2, len(rows)), np.nan)
         every[:, rows] = step.error[: rows.sum()], step.r_d[: rows.sum()]
         step = replace(step, error=every[0], r_d=every[1])
-        return Look(self.t, step, float(sigma), at, against)
+        return DrivenState(self.t, step, float(sigma), at, against)

@@ -63,7 +63,7 @@ def why(error: BaseException) -> str:
     return str(error) if isinstance(error, NmmError) else f"{type(error).__name__}: {error}"
 
 
-class Made(NamedTuple):
+class PendingPlan(NamedTuple):
     """A plan to a target at `value`, what follows it, and its reference, with `apart` and `duration`."""
 
     plan: Plan
@@ -85,9 +85,9 @@ class Planning:
         self.on, self.number = False, 0
         self._driven, self._task = driven, 0
         self._value, self._since = np.zeros(0), 0.0
-        self._making: Future[Made] | None = None
+        self._making: Future[PendingPlan] | None = None
         self._began, self._refused = 0.0, ""
-        self._followed: Made | None = None
+        self._followed: PendingPlan | None = None
         self._stands: Controller | None = None
 
     def turn(self, on: bool) -> None:
@@ -189,7 +189,7 @@ def on_floor(q: Array) -> Array:
     return np.column_stack([q[:, :2], np.full(len(q), 0.005)])
 
 
-def made_for(controller: Controller, q: Array, number: int, target: LiveTarget, dt: float) -> Made:
+def made_for(controller: Controller, q: Array, number: int, target: LiveTarget, dt: float) -> PendingPlan:
     """A plan from q to a target of a controller's task, with its limits and distances, and its follower."""
     arguments, task = controller.given, controller.given.task.tasks[number]
     constraints: dict[str, Any] = {
@@ -202,4 +202,4 @@ def made_for(controller: Controller, q: Array, number: int, target: LiveTarget, 
     made = led_by(controller, reference, ProjectedGradient())
     made.step(0.0, q, dt)  # the first call compiles
     made.reset()
-    return Made(planned, made, reference.function, target.value)
+    return PendingPlan(planned, made, reference.function, target.value)

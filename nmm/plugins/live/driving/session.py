@@ -21,7 +21,7 @@ from nmm.base.resolver_style import looks
 from nmm.model.robots.motion import Camera
 from nmm.motion.components import Axes
 from nmm.motion.seen import SeenPoints
-from nmm.plugins.live.driving.driven import Driven, Look, Made
+from nmm.plugins.live.driving.driven import Driven, DrivenState, PendingController
 from nmm.plugins.live.driving.planning import Planning, later, why
 from nmm.plugins.live.driving.setups import Choice, DriveSetup, named
 from nmm.plugins.live.server import Visitor
@@ -134,7 +134,7 @@ class DriveSession(RobotSession):
         self._picks: dict[str, object] = {}
         #: The number of the last aim that each task's target has had.
         self._heard: dict[int, int] = {}
-        self._making: Future[Made] | None = None
+        self._making: Future[PendingController] | None = None
         self._paused = False
         self._notice, self._until = "", 0.0
         self._count = 0
@@ -178,7 +178,7 @@ class DriveSession(RobotSession):
         self._publish(look)
         self.begin(self._run, "nmm drive")
 
-    def _cameras(self, look: Look) -> tuple[Camera, ...]:
+    def _cameras(self, look: DrivenState) -> tuple[Camera, ...]:
         t, q, r_d = np.array([look.t]), look.step.q[np.newaxis], look.step.r_d[np.newaxis]
         return self._seen.by_camera(t, q, r_d)
 
@@ -298,7 +298,7 @@ class DriveSession(RobotSession):
             line = encode(self._planning.shown(self._drawn, self.shown.now[1]))
             self._plan = self._planning.number, line
 
-    def _publish(self, look: Look) -> None:
+    def _publish(self, look: DrivenState) -> None:
         driven = self._driven
         self._count += 1
         if not self._samples or self._samples[-1][1][0] != look.t:
@@ -317,7 +317,7 @@ class DriveSession(RobotSession):
         }
         self._picture = self.placed(look.t), picture
 
-    def _values(self, look: Look) -> list[float | None]:
+    def _values(self, look: DrivenState) -> list[float | None]:
         step = look.step
         known: dict[str, Iterable[float]] = {
             "error_norm": [float(np.sqrt(np.nansum(step.error**2)))],
@@ -329,7 +329,7 @@ class DriveSession(RobotSession):
         seen = live_numbers(self._cameras(look), self.robot, step.q[np.newaxis])[0]
         return finite([*(x for curve in self._curves for x in known[curve.name]), *step.u, *step.q, *seen])
 
-    def _state(self, look: Look) -> tuple[str, bool]:
+    def _state(self, look: DrivenState) -> tuple[str, bool]:
         if self._driven.trouble:
             return "; ".join(filter(None, [f"Stands still: {self._driven.trouble}", look.against])), True
         if time.monotonic() < self._until:
@@ -347,7 +347,7 @@ class DriveSession(RobotSession):
         return ", ".join(parts), False
 
 
-def _made(driven: Driven, key: str, value: object) -> Made:
+def _made(driven: Driven, key: str, value: object) -> PendingController:
     """A controller for a choice; a resolver new to this machine has to be compiled."""
     made = driven.with_choice(key, value)
     with suppress(NmmError):  # the loop meets it again, and reports it

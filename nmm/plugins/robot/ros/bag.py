@@ -84,7 +84,7 @@ def read_bag(
     topics = (joints,) if isinstance(joints, str) else tuple(joints)
     names = Names(topics, odometry, tf, map, odom, base, namespace, prefix)
     try:
-        motion = _Motion(Recorded(robot, file, names))
+        motion = _RecordedMotion(Recorded(robot, file, names))
     except InputError as error:
         raise (error if str(file) in error.where else error.at(file)) from None
     times, q, u = motion.times, motion.q, motion.u
@@ -113,7 +113,7 @@ def read_bag(
     )
 
 
-class _Motion:
+class _RecordedMotion:
     """Times (N,), ns, q (N, n), u (N, n_u) of what was recorded, and `believed`, what odometry has beside a
     map."""
 

@@ -11,7 +11,7 @@ from scipy.optimize import Bounds, minimize
 from nmm.analysis.singular.parts import null_space
 from nmm.base.arrays import Array, Flags, Integers
 from nmm.base.progress import Progress
-from nmm.plugins.symbolic.search.space import ROUNDING, Search
+from nmm.plugins.symbolic.search.space import ROUNDING, SearchSpace
 
 #: So many of the lowest ends are followed to the bottom.
 FOLLOWED = 3
@@ -56,7 +56,7 @@ class LocalMinimum:
         return text
 
 
-def followed(search: Search, z: Array) -> Array:
+def followed(search: SearchSpace, z: Array) -> Array:
     """The lowest of the ends z (N, a), each brought to its minimum of σ, (FOLLOWED or fewer, a)."""
     if not len(z) or not len(search.axes):
         return z[:FOLLOWED]
@@ -66,7 +66,7 @@ def followed(search: Search, z: Array) -> Array:
     return np.array([_bottom(search, z[i]) for i in order]).reshape(-1, z.shape[1])
 
 
-def _bottom(search: Search, z: Array) -> Array:
+def _bottom(search: SearchSpace, z: Array) -> Array:
     def sigma(point: Array) -> tuple[float, Array]:
         _, C, values = search.equations(point[np.newaxis], corank=1)
         return float(values[0, -1]), C[0, 0]
@@ -79,7 +79,7 @@ def _bottom(search: Search, z: Array) -> Array:
     return np.asarray(both[np.argmin(search.sigma(both)[0])])
 
 
-def lowest(search: Search, z: Array) -> LocalMinimum | None:
+def lowest(search: SearchSpace, z: Array) -> LocalMinimum | None:
     """Of points z (N, a) that with the smallest σ; None without points."""
     if not len(z):
         return None
@@ -104,7 +104,7 @@ NOISE = 1e-8
 TOGETHER, SLOW = 20.0, 0.3
 
 
-def _minimum_norm_step(search: Search, z: Array, corank: int, damping: Array) -> tuple[Array, Array]:
+def _minimum_norm_step(search: SearchSpace, z: Array, corank: int, damping: Array) -> tuple[Array, Array]:
     """-Cᵀ (C Cᵀ + damping |F|²)⁻¹ F, (N, a), inside the bounds, and the singular values.
 
     The damping falls with σ², so that convergence stays quadratic.
@@ -123,7 +123,7 @@ def _minimum_norm_step(search: Search, z: Array, corank: int, damping: Array) ->
 
 
 def descend(
-    search: Search, z: Array, *, iterations: int = 60, progress: Progress | None = None
+    search: SearchSpace, z: Array, *, iterations: int = 60, progress: Progress | None = None
 ) -> tuple[Array, Array]:
     """Local minima of σ from z (N, a): end points (N, a), and σ beside the largest (N,). σ never grows."""
     z = search.clip(z)
@@ -155,7 +155,7 @@ def descend(
     return z, ratio
 
 
-def _trials(search: Search, z: Array, damping: Array, slow: Flags) -> Array:
+def _trials(search: SearchSpace, z: Array, damping: Array, slow: Flags) -> Array:
     """Points (N, tries, a): towards one singular value at zero, and towards two where two fall slowly."""
     step, values = _minimum_norm_step(search, z, 1, damping)
     steps = step[:, np.newaxis] * FACTORS[:, np.newaxis]
@@ -201,7 +201,7 @@ class Local:
         return int(self.codimension[i]), int(self.rank[i]), tuple(bool(flag) for flag in self.free[i])
 
 
-def localised(search: Search, z: Array) -> Local:
+def localised(search: SearchSpace, z: Array) -> Local:
     """What the singular set is like at its points z (N, a)."""
     rank = search.ranks(z)
     corank = search.measure.full_rank - rank
@@ -212,7 +212,7 @@ def localised(search: Search, z: Array) -> Local:
     return Local(z, rank, free_coordinates(search, z, rank), codimension)
 
 
-def normal_spaces(search: Search, z: Array, corank: int) -> list[Array]:
+def normal_spaces(search: SearchSpace, z: Array, corank: int) -> list[Array]:
     """Orthonormal rows of each point's slopes, (codimension, a)."""
     _, C, values = search.equations(z, corank)
     _, sizes, rows = np.linalg.svd(C, full_matrices=False)
@@ -222,7 +222,7 @@ def normal_spaces(search: Search, z: Array, corank: int) -> list[Array]:
     ]
 
 
-def free_coordinates(search: Search, z: Array, rank: Integers) -> Flags:
+def free_coordinates(search: SearchSpace, z: Array, rank: Integers) -> Flags:
     """(N, a): whether J's rank stays as low when one coordinate takes values from all over its range."""
     count, a = z.shape
     drawn = search.draw(count * a * MOVES).reshape(count, a, MOVES, a)
@@ -233,7 +233,7 @@ def free_coordinates(search: Search, z: Array, rank: Integers) -> Flags:
     return np.asarray(np.all(stays.reshape(count, a, MOVES), axis=2))
 
 
-def stay_singular(search: Search, z: Array, rank: Integers) -> Flags:
+def stay_singular(search: SearchSpace, z: Array, rank: Integers) -> Flags:
     """Whether points z (N, a) have rank at most `rank` (N,), or reach it by a motion of ROUNDED.
 
     So 1.5708 in a file counts as π/2. What has no J stays.
@@ -248,14 +248,14 @@ def stay_singular(search: Search, z: Array, rank: Integers) -> Flags:
     return np.asarray(stay | ~np.isfinite(ratio))
 
 
-def shaken(search: Search, z: Array, size: float = SHAKE) -> Array:
+def shaken(search: SearchSpace, z: Array, size: float = SHAKE) -> Array:
     """Singular points (N, a) beside z (N, a): moved at random, then brought back; where it fails, z."""
     moved, ratio = descend(search, z + search.rng.uniform(-size, size, z.shape), iterations=30)
     good = (ratio <= search.tolerance) & (np.max(np.abs(moved - z), axis=1, initial=0.0) < 6.0 * size)
     return np.asarray(np.where(good[:, np.newaxis], moved, z))
 
 
-def tangents(search: Search, z: Array, rank: int) -> Array:
+def tangents(search: SearchSpace, z: Array, rank: int) -> Array:
     """Orthonormal tangents (dimension, a) of the singular set at z (a,).
 
     Given by the equations' slopes; where these vanish (σ touches zero as a square), by close points.
@@ -273,7 +273,7 @@ def tangents(search: Search, z: Array, rank: int) -> Array:
     return extended if len(extended) < len(by_slopes) else by_slopes
 
 
-def walk(search: Search, z: Array, rank: int, along: Array) -> Array:
+def walk(search: SearchSpace, z: Array, rank: int, along: Array) -> Array:
     """Points (N, a) of one piece of the singular set, z (a,) first, by random steps along its tangents.
 
     Points that return from far, or where the tangents turn much, may lie on another piece and are dropped.

@@ -18,7 +18,7 @@ from nmm.base.text_format import listed, value_text
 from nmm.plugins.symbolic.search.descent import LocalMinimum, descend, followed, lowest
 from nmm.plugins.symbolic.search.family import SingularFamily
 from nmm.plugins.symbolic.search.sorting import everywhere, families_of
-from nmm.plugins.symbolic.search.space import TOLERANCE, Measure, Search, search_space
+from nmm.plugins.symbolic.search.space import TOLERANCE, RankMeasure, SearchSpace, search_space
 
 #: Cheap samples for each start of the better half.
 SAMPLES = 20
@@ -179,7 +179,7 @@ def find_singularities(
     ['q2 = 0 or ±π; x, y, theta and q1 free; loses ee.x (rank 1); 40 starts']
     """
     jacobians = Jacobians(subject)
-    measure, robot = Measure(jacobians, part, length, sizes, scalar(t, "t")), jacobians.robot
+    measure, robot = RankMeasure(jacobians, part, length, sizes, scalar(t, "t")), jacobians.robot
     starts, seed = counted(starts, "starts"), counted(seed, "seed", 0)
     rng = np.random.default_rng(seed)
     stand = robot.rest if at is None else robot.q(at)
@@ -218,7 +218,7 @@ def find_singularities(
     )
 
 
-def _starts(search: Search, starts: int) -> tuple[Array, bool]:
+def _starts(search: SearchSpace, starts: int) -> tuple[Array, bool]:
     """Starts (starts, a) that have a J, and whether all samples are singular."""
     pool = search.draw(max(SAMPLES * ((starts + 1) // 2), 2 * SAMPLES))
     sigma, ratio = search.sigma(pool)

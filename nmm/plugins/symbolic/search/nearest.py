@@ -16,7 +16,7 @@ from nmm.base.text_format import listed, value_text
 from nmm.plugins.symbolic.search.descent import FLAT, descend
 from nmm.plugins.symbolic.search.family import SingularFamily
 from nmm.plugins.symbolic.search.sorting import family_at
-from nmm.plugins.symbolic.search.space import TOLERANCE, Measure, Search, search_space
+from nmm.plugins.symbolic.search.space import TOLERANCE, RankMeasure, SearchSpace, search_space
 
 #: Lengths of a tangent step that are tried.
 FACTORS = np.array([2.0, 1.0, 0.5, 0.1])
@@ -161,7 +161,7 @@ def nearest_singularity(
     """
     jacobians = Jacobians(subject)
     t, given = checked(jacobians, t, q)
-    measure, robot = Measure(jacobians, part, length, sizes, t), jacobians.robot
+    measure, robot = RankMeasure(jacobians, part, length, sizes, t), jacobians.robot
     starts, rng = counted(starts, "starts"), np.random.default_rng(counted(seed, "seed", 0))
     search = search_space(measure, given, among, ranges, length, tolerance, rng, around=True)
     goal = search.z(given)
@@ -190,7 +190,7 @@ def nearest_singularity(
     )
 
 
-def _starts(search: Search, goal: Array, starts: int) -> Array:
+def _starts(search: SearchSpace, goal: Array, starts: int) -> Array:
     """(starts, a): the goal, half the others around it near and far, the rest all over the ranges."""
     near, rng = starts // 2, search.rng
     directions = rng.standard_normal((near, len(goal)))
@@ -201,7 +201,7 @@ def _starts(search: Search, goal: Array, starts: int) -> Array:
     return drawn[np.isfinite(search.sigma(drawn)[0])][:starts]
 
 
-def _nearest(search: Search, z: Array, goal: Array, progress: Progress | None) -> Array:
+def _nearest(search: SearchSpace, z: Array, goal: Array, progress: Progress | None) -> Array:
     """The nearest to the goal of singular points z (N, a), each slid towards it; (a,)."""
     for turn, (rounds, kept) in enumerate([(3, 4 * KEPT), (8, KEPT), (150, 1)]):
         if progress is not None:
@@ -214,7 +214,7 @@ def _nearest(search: Search, z: Array, goal: Array, progress: Progress | None) -
     return z[0]
 
 
-def slide(search: Search, z: Array, goal: Array, rounds: int) -> Array:
+def slide(search: SearchSpace, z: Array, goal: Array, rounds: int) -> Array:
     """Singular points (N, a) that are no farther from the goal (a,) than z (N, a) are, point by point."""
     z = z.copy()
     distance = np.linalg.norm(z - goal, axis=1)
@@ -238,7 +238,7 @@ def slide(search: Search, z: Array, goal: Array, rounds: int) -> Array:
     return z
 
 
-def _towards(search: Search, z: Array, goal: Array) -> Array:
+def _towards(search: SearchSpace, z: Array, goal: Array) -> Array:
     """The part (N, a) of goal - z that is tangent to the singular set and stays inside the bounds."""
     _, C, values = search.equations(z, 1)
     floor = FLAT * np.maximum(values[:, :1], 1e-300)

@@ -11,7 +11,7 @@ import numpy as np
 from nmm.base.arrays import Array, Flags
 from nmm.plugins.symbolic.search.descent import Local, localised, shaken, stay_singular, tangents, walk
 from nmm.plugins.symbolic.search.family import Relation, SingularFamily, merged
-from nmm.plugins.symbolic.search.space import Search
+from nmm.plugins.symbolic.search.space import SearchSpace
 
 #: What spreads less than this along a walk stays, in units.
 STAYS = 5e-5
@@ -25,7 +25,7 @@ EXAMPLES = 4
 MEMBERS, SLACK = 16, 100.0
 
 
-def families_of(search: Search, z: Array) -> tuple[SingularFamily, ...]:
+def families_of(search: SearchSpace, z: Array) -> tuple[SingularFamily, ...]:
     """The families of singular points z (N, a), the thickest first."""
     if not len(z):
         return ()
@@ -51,7 +51,7 @@ def families_of(search: Search, z: Array) -> tuple[SingularFamily, ...]:
     return tuple(sorted(families, key=lambda family: (-family.dimension, -family.starts)))
 
 
-def family_at(search: Search, z: Array) -> SingularFamily | None:
+def family_at(search: SearchSpace, z: Array) -> SingularFamily | None:
     """The family of z (a,), or a larger adjoining one; None where large random motions contradict it."""
     if not len(search.axes):
         return everywhere(search, z, 1)
@@ -66,7 +66,7 @@ def family_at(search: Search, z: Array) -> SingularFamily | None:
     return None
 
 
-def _family_of(search: Search, local: Local, i: int) -> SingularFamily | None:
+def _family_of(search: SearchSpace, local: Local, i: int) -> SingularFamily | None:
     """The family of point i, by a walk from it; None where large random motions contradict it."""
     z, rank, free = local.z[i], int(local.rank[i]), local.free[i]
     along = tangents(search, z, rank)
@@ -84,7 +84,7 @@ def _family_of(search: Search, local: Local, i: int) -> SingularFamily | None:
     return family if _holds(search, family, points, free) else None
 
 
-def everywhere(search: Search, z: Array, starts: int) -> SingularFamily:
+def everywhere(search: SearchSpace, z: Array, starts: int) -> SingularFamily:
     """The family of all configurations, for a J without full rank anywhere."""
     names = search.robot.q_names
     q = search.q(z[np.newaxis])
@@ -104,7 +104,7 @@ def everywhere(search: Search, z: Array, starts: int) -> SingularFamily:
     )
 
 
-def _ties(search: Search, points: Array, free: Flags) -> tuple[tuple[Relation, ...], tuple[str, ...]]:
+def _ties(search: SearchSpace, points: Array, free: Flags) -> tuple[tuple[Relation, ...], tuple[str, ...]]:
     """Relations along the walk (N, a): pinned coordinates and sums; and all that are tied but not pinned."""
     pinned = ~free & (np.ptp(points, axis=0) <= STAYS)
     tied = np.flatnonzero(~free & ~pinned)
@@ -117,7 +117,7 @@ def _ties(search: Search, points: Array, free: Flags) -> tuple[tuple[Relation, .
     return tuple(ties), tuple(search.robot.q_names[j] for j in search.axes[tied])
 
 
-def _relation(search: Search, points: Array, multiples: dict[int, int]) -> Relation:
+def _relation(search: SearchSpace, points: Array, multiples: dict[int, int]) -> Relation:
     """That a sum of whole multiples of axes has the value that it has at the points (N, a)."""
     axes = search.axes[list(multiples)]
     total = np.median(sum(number * points[:, j] for j, number in multiples.items()))
@@ -169,7 +169,7 @@ def _echelon(rows: Array) -> Array:
     return R
 
 
-def _belongs(search: Search, family: SingularFamily, local: Local, i: int) -> bool:
+def _belongs(search: SearchSpace, family: SingularFamily, local: Local, i: int) -> bool:
     """Whether point i satisfies what is pinned; and is of the same sort, where equations tie the rest."""
     if local.rank[i] > family.rank or not family.contains(search.q(local.z[i : i + 1])[0]):
         return False
@@ -179,7 +179,7 @@ def _belongs(search: Search, family: SingularFamily, local: Local, i: int) -> bo
 
 
 def _with_examples(
-    search: Search, family: SingularFamily, local: Local, members: list[int]
+    search: SearchSpace, family: SingularFamily, local: Local, members: list[int]
 ) -> SingularFamily:
     """The family with its starts and examples, the first with the free coordinates of `at`, if possible.
 
@@ -200,7 +200,7 @@ def _with_examples(
     return replace(family, examples=q, starts=len(members), lost=search.measure.lost_text(q[0], family.rank))
 
 
-def _holds(search: Search, family: SingularFamily, points: Array, free: Flags) -> bool:
+def _holds(search: SearchSpace, family: SingularFamily, points: Array, free: Flags) -> bool:
     """Whether J's rank is as low at random members, far away: all members, where nothing else ties them."""
     names = search.robot.q_names
     named = {name for relation in family.constraints for name in relation.coefficients} | set(family.free)
@@ -223,7 +223,7 @@ def _holds(search: Search, family: SingularFamily, points: Array, free: Flags) -
     return bool(np.all(stay_singular(search.looser(SLACK), search.z(q), rank)))
 
 
-def _completed(search: Search, families: list[SingularFamily]) -> list[SingularFamily]:
+def _completed(search: SearchSpace, families: list[SingularFamily]) -> list[SingularFamily]:
     """Add the families at opposite values of a pinned angle or sum, also half a turn away.
 
     Those that no start found are proved by random members.
@@ -247,7 +247,7 @@ def _completed(search: Search, families: list[SingularFamily]) -> list[SingularF
     return every
 
 
-def _moved(search: Search, q: Array, relation: Relation, value: float) -> Array:
+def _moved(search: SearchSpace, q: Array, relation: Relation, value: float) -> Array:
     """Configurations (N, n) that satisfy a relation with another value, by its first coordinate."""
     name, number = next(iter(relation.coefficients.items()))
     moved = q.copy()
@@ -255,7 +255,7 @@ def _moved(search: Search, q: Array, relation: Relation, value: float) -> Array:
     return search.fold(moved)
 
 
-def _proved(search: Search, family: SingularFamily) -> bool:
+def _proved(search: SearchSpace, family: SingularFamily) -> bool:
     """Whether its examples and random members are singular, with the same freedom and no more."""
     z = search.z(family.examples)
     free = np.array([search.robot.q_names[j] in family.free for j in search.axes])

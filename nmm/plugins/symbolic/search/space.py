@@ -29,7 +29,7 @@ TOLERANCE = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
-class Search:
+class SearchSpace:
     """What is searched: a measure over the points z (N, a) of the coordinates that matter.
 
     at (n,), moving : where the other coordinates stay; indices of those that may move
@@ -40,7 +40,7 @@ class Search:
     tolerance : singular values this small beside the largest of the whole J are zero
     """
 
-    measure: Measure
+    measure: RankMeasure
     at: Array
     moving: tuple[int, ...]
     axes: Integers
@@ -118,7 +118,7 @@ class Search:
         """Wᵀ J V, its slopes along z, and the singular values."""
         return self.measure.equations(self.q(z), self.axes, self.units[self.axes], corank)
 
-    def looser(self, factor: float) -> Search:
+    def looser(self, factor: float) -> SearchSpace:
         return replace(self, tolerance=factor * self.tolerance)
 
 
@@ -136,7 +136,7 @@ def reach(robot: Robot) -> float:
 
 
 def search_space(
-    measure: Measure,
+    measure: RankMeasure,
     at: Array,
     among: Sequence[str] | None,
     ranges: Mapping[str, tuple[float, float]] | None,
@@ -145,7 +145,7 @@ def search_space(
     rng: np.random.Generator,
     *,
     around: bool = False,
-) -> Search:
+) -> SearchSpace:
     """The search space of `find_singularities`; coordinates outside it stay `at` (n,).
 
     With `around`, ranges are centred on `at` within the limits. `SingularError` where J exists nowhere.
@@ -164,7 +164,7 @@ def search_space(
         window = _default(lower[j], upper[j], 0.0 if turn else at[j], np.pi if angle[j] else span, cut=turn)
         lower[j], upper[j] = windows.get(j) or window
     tolerance, none = positive(tolerance, "tolerance"), np.zeros(robot.n, dtype=bool)
-    search = Search(measure, at, moving, np.array(moving), lower, upper, none, units, tolerance, rng)
+    search = SearchSpace(measure, at, moving, np.array(moving), lower, upper, none, units, tolerance, rng)
     q = search.q(search.draw(20 * PROBES))
     q = q[np.isfinite(measure.sigma(q)[0])][:PROBES]
     if not len(q):
@@ -223,7 +223,7 @@ def _default(lower: float, upper: float, center: float, half: float, cut: bool) 
     return center - half, center + half
 
 
-def _same(measure: Measure, q: Array, other: Array) -> bool:
+def _same(measure: RankMeasure, q: Array, other: Array) -> bool:
     """Whether J's singular values are the same at both, row by row; and J exists at both."""
     (a, largest), (b, _) = measure.values(q), measure.values(other)
     with np.errstate(invalid="ignore"):
@@ -238,7 +238,7 @@ BLOWN = 100.0
 UNWRITTEN = 1e-4
 
 
-class Measure:
+class RankMeasure:
     """Singular values of some columns of the scaled J, and the equations that make them vanish.
 
     J has full rank when its k-th singular value σ is not zero, k = min(rows, inputs of the part). Where c
