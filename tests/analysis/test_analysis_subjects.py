@@ -34,14 +34,16 @@ def subtracted() -> list[Entry]:
 def test_a_function_without_target_has_the_J_of_its_own_derivative(
     entry: Entry, robots: dict[str, Robot], rng: np.random.Generator
 ) -> None:
-    for name in entry.robots:
-        robot = robots[name]
-        if len(entry.function.rows(robot)) > robot.n_u:
-            continue
-        q = rng.uniform(-1.5, 1.5, robot.n)
-        here = Configuration(robot, q)
-        expected = evaluate(entry.function, 0.0, here).value_q @ here.S
-        np.testing.assert_allclose(Jacobians((robot, entry.function)).J(0.0, q), expected, atol=1e-14)
+    able = [
+        robots[name] for name in entry.robots if len(entry.function.rows(robots[name])) <= robots[name].n_u
+    ]
+    if not able:
+        return
+    robot = able[-1]
+    q = rng.uniform(-1.5, 1.5, robot.n)
+    here = Configuration(robot, q)
+    expected = evaluate(entry.function, 0.0, here).value_q @ here.S
+    np.testing.assert_allclose(Jacobians((robot, entry.function)).J(0.0, q), expected, atol=1e-14)
 
 
 @pytest.mark.parametrize("function", [Orientation("tool0"), Pose("tool0")], ids=["orientation", "pose"])

@@ -57,10 +57,15 @@ def least_between(run, obstacles, robot):
     return min(found)
 
 
-@pytest.mark.parametrize("method", ["zoh", "rk4"])
-@pytest.mark.parametrize("limits", [None, limited()], ids=["free", "limited"])
 @pytest.mark.parametrize(
-    "resolver", [nmm.ProjectedGradient(), nmm.ReducedGradient(alpha=0.5)], ids=["pg", "rg"]
+    ("method", "limits", "resolver"),
+    [  # each two of their values together
+        ("zoh", None, nmm.ProjectedGradient()),
+        ("rk4", limited(), nmm.ProjectedGradient()),
+        ("rk4", None, nmm.ReducedGradient(alpha=0.5)),
+        ("zoh", limited(), nmm.ReducedGradient(alpha=0.5)),
+    ],
+    ids=["zoh-free-pg", "rk4-limited-pg", "rk4-free-rg", "zoh-limited-rg"],
 )
 def test_a_pillar_in_the_way_is_not_touched(robot, method, limits, resolver):
     one = controller(robot, [pillar()], limits=limits, resolver=resolver)

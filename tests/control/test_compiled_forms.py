@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -69,11 +70,13 @@ def in_plain_python() -> Iterator[None]:
         yield
 
 
-def both_forms(kernel: Kernel, one: Sequence[Any], other: Sequence[Any]) -> None:
-    """Run the plain form on one set of arguments, the compiled one on the other."""
+def both_forms(*calls: tuple[Kernel, Sequence[Any], Sequence[Any]]) -> None:
+    """Call each kernel's plain form with the first arguments, its compiled one with the others."""
     with in_plain_python():
-        kernel.plain(*one)
-    kernel(*other)
+        for kernel, one, _ in calls:
+            kernel.plain(*one)
+    for kernel, _, other in calls:
+        kernel(*other)
 
 
 def kernels() -> dict[str, Kernel]:
@@ -125,18 +128,21 @@ def test_function_kernels(entry: Entry, robots: dict[str, Robot], rng: np.random
     robot = robots[entry.robots[0]]
     q = random_configuration(robot, rng)
     configuration = Configuration(robot, q)
+    stages = entry.function.stages(robot)
+    rows, count = max(stage.rows for stage in stages), len(entry.function.rows(robot))
+    outcomes: dict[float, list[list[Array]]] = {}
+    calls: list[tuple[Kernel, Sequence[Any], Sequence[Any]]] = []
     for t in TIMES[:4]:
-        stages = entry.function.stages(robot)
-        rows = max(stage.rows for stage in stages)
-        outcomes = [[np.zeros(rows), np.zeros(rows), np.zeros((rows, robot.n))] for _ in range(2)]
+        outcomes[t] = [[np.zeros(rows), np.zeros(rows), np.zeros((rows, robot.n))] for _ in range(2)]
         for stage in stages:
             at = stage_arguments(stage, t, configuration)
-            written = (Rows(*(array[: stage.rows] for array in outcome)) for outcome in outcomes)
-            both_forms(stage.kernel, *((*at, rows) for rows in written))
-        for plain, compiled in zip(*outcomes, strict=True):
+            one, other = (Rows(*(array[: stage.rows] for array in outcome)) for outcome in outcomes[t])
+            calls.append((stage.kernel, (*at, one), (*at, other)))
+    both_forms(*calls)
+    for t, (plain_parts, compiled_parts) in outcomes.items():
+        for plain, compiled in zip(plain_parts, compiled_parts, strict=True):
             assert_same(plain, compiled)
-        count = len(entry.function.rows(robot))
-        for plain, found in zip(outcomes[0], evaluate(entry.function, t, configuration), strict=True):
+        for plain, found in zip(plain_parts, evaluate(entry.function, t, configuration), strict=True):
             assert_same(plain[:count], found)
 
 
@@ -150,10 +156,11 @@ def test_comparison_kernels(entry: Entry, robots: dict[str, Robot], rng: np.rand
     assert kernel is not None
     s = len(entry.function.rows(robot))
     nothing = stage_arguments(Stage(kernel, s), 0.0, Configuration(robot, np.zeros(robot.n)))
-    for _ in range(20):
-        given = [rng.normal(size=shape) for shape in (3 * s, 3 * s, (3 * s, robot.n))]
-        outcomes = [[part.copy() for part in given] for _ in range(2)]
-        both_forms(kernel, *((*nothing, Rows(*outcome)) for outcome in outcomes))
+    shapes = (3 * s, 3 * s, (3 * s, robot.n))
+    starts = [[rng.normal(size=shape) for shape in shapes] for _ in range(20)]
+    both = [[[part.copy() for part in start] for _ in range(2)] for start in starts]
+    both_forms(*((kernel, *((*nothing, Rows(*outcome)) for outcome in outcomes)) for outcomes in both))
+    for given, outcomes in zip(starts, both, strict=True):
         for plain, compiled, before in zip(*outcomes, given, strict=True):
             assert_same(plain, compiled)
             assert np.array_equal(plain[: 2 * s], before[: 2 * s])
@@ -163,12 +170,14 @@ def test_comparison_kernels(entry: Entry, robots: dict[str, Robot], rng: np.rand
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_platform_kernels(name: str, rng: np.random.Generator) -> None:
     platform = EXAMPLES[name]
+    n_p, p, calls = platform.n_p, platform.p, []
     for _ in range(20):
         qp = random_qp(platform, rng, 5.0)
-        n_p, p = platform.n_p, platform.p
         both = [(np.zeros((n_p, p)), np.zeros((n_p, p, n_p))) for _ in range(2)]
-        both_forms(platform.velocity_map, *((qp, platform.parameters, *maps) for maps in both))
-        assert_same(*(np.append(*maps) for maps in both))
+        calls.append((platform.velocity_map, *((qp, platform.parameters, *maps) for maps in both)))
+    both_forms(*calls)
+    for _, plain, compiled in calls:
+        assert_same(*(np.append(*maps[2:]) for maps in (plain, compiled)))
 
 
 RESOLVERS = [
@@ -224,7 +233,7 @@ def test_limit_kernel(rng: np.random.Generator) -> None:
             answers = unanswered(4, 1), unanswered(4, 1)
             for answer in answers:
                 answer.u[:], answer.status[()] = u, status
-            both_forms(enforce_limits, *((problem.arrays, T, answer) for answer in answers))
+            both_forms((enforce_limits, *((problem.arrays, T, answer) for answer in answers)))
             both = [np.concatenate([*map(np.atleast_1d, answer)]) for answer in answers]
             assert_same(*both)
             moved += not np.array_equal(both[0][:4], u)
@@ -244,6 +253,7 @@ def test_no_kernel_is_left_out(robots: dict[str, Robot]) -> None:
 # Whole programs, in other processes.
 
 
+@cache
 def answers() -> dict[str, Array]:
     """Everything the two forms are compared by: functions, errors, platforms, and the inputs of the cases."""
     found = {}

@@ -71,7 +71,7 @@ def test_the_answer_is_the_least_squares_one(
     s, m = shape
     damping, threshold = 0.4, 0.6
     for weighted in (False, True):
-        for _ in range(20):
+        for _ in range(10):
             scales, root = rng.uniform(0.5, 2.0, s), rng.normal(size=(m, m))
             W = root @ root.T + 0.1 * np.eye(m) if weighted else np.eye(m)
             W = (W + W.T) / 2
@@ -104,7 +104,7 @@ def test_undamped_it_is_the_projected_gradient(
     shape: tuple[int, int], law: Any, rng: np.random.Generator
 ) -> None:
     s, m = shape
-    for _ in range(20):
+    for _ in range(10):
         J = with_singular_values(rng.uniform(0.051, 2.0, s), m, rng)
         problem = Problem(J, rng.normal(size=s), rng.normal(size=m))
         for weights in (None, rng.uniform(1.0, 3.0, m)):
@@ -129,7 +129,7 @@ def test_inputs_stay_bounded(shape: tuple[int, int], law: Any, rng: np.random.Ge
     damping = threshold / math.sqrt(2.0)
     most = 1.0 / (2.0 * damping) if law == "constant" else 1.0 / threshold
     tightest = 0.0
-    for _ in range(100):
+    for _ in range(50):
         scales = rng.uniform(0.5, 2.0, s)
         J = np.diag(scales) @ with_singular_values(random_values(s, rng), m, rng)
         rate = rng.normal(size=s)
@@ -196,7 +196,9 @@ def test_u_is_continuous_through_singularities(name: str, rng: np.random.Generat
     With half the step the largest jump halves: nothing is discontinuous. The reduced gradient has one
     partition here, so that no switch of its own is among the jumps.
     """
-    for _ in range(2):
+    # Beside its singular block the reduced gradient's inputs change over shorter ways.
+    counts = (2001, 4001) if name == "rg" else (501, 1001)
+    for _ in range(1 if name == "rg" else 2):
         U = np.linalg.qr(rng.normal(size=(2, 2)))[0]
         V = np.linalg.qr(rng.normal(size=(2, 2)))[0] if name == "rg" else np.eye(4)[:, :2]
         first, last = (U * [1.0, value] @ V.T for value in (0.3, -0.3))
@@ -205,7 +207,7 @@ def test_u_is_continuous_through_singularities(name: str, rng: np.random.Generat
             first, last = (np.hstack([J, U[:, :1] @ more]) for J in (first, last))
         rate, h = rng.normal(size=2), rng.normal(size=4)
         jumps, largest = [], 0.0
-        for count in (2001, 4001):
+        for count in counts:
             state = RESOLVERS[name].start(Problem(first, rate, h).dimensions)
             u = [RESOLVERS[name].resolve(Problem(J, rate, h), state).u for J in through(first, last, count)]
             jumps.append(np.linalg.norm(np.diff(u, axis=0), axis=1).max())
@@ -215,7 +217,7 @@ def test_u_is_continuous_through_singularities(name: str, rng: np.random.Generat
             assert shorter < 0.55 * longer
         if name == "rg":
             undamped = ReducedGradient(3.0, [("u0", "u1")], threshold=1e-300)
-            apart = [undamped.resolve(Problem(J, rate, h)).u for J in through(first, last, 1000)]
+            apart = [undamped.resolve(Problem(J, rate, h)).u for J in through(first, last, 500)]
             assert largest < 0.2 * np.linalg.norm(apart, axis=1).max()
 
 

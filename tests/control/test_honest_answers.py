@@ -20,7 +20,7 @@ from nmm.control.resolvers import Status
 
 Array = NDArray[np.float64]
 
-PROBLEMS = 10_000
+PROBLEMS = 4_000
 ROBOTS = (
     ("unicycle_2r", "ee"),
     ("unicycle_3r", "ee"),

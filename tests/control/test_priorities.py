@@ -22,7 +22,7 @@ RESOLVERS = {
 @pytest.mark.parametrize("if_possible", [False, True])
 def test_no_program_finds_more_for_any_level(if_possible: bool) -> None:
     """Linear ones for the rates and for limits that are kept if possible, a quadratic one for the rest."""
-    offs = [compared(problem) for problem in problems(60, 2, if_possible=if_possible)]
+    offs = [compared(problem) for problem in problems(30, 2, if_possible=if_possible)]
     worst = Off(*np.array(offs).max(axis=0).tolist())
     assert worst.rate <= 1e-8
     assert worst.kept <= 1e-8

@@ -88,7 +88,7 @@ def close(found: Array, expected: Array, tolerance: float = 1e-10) -> None:
 
 @each_shape
 def test_every_resolver_does_the_task(shape: tuple[int, int], rng: np.random.Generator) -> None:
-    for _ in range(20):
+    for _ in range(10):
         problem = Example(shape, rng)
         weighted = ProjectedGradient(3.0, weights=rng.uniform(0.1, 10, problem.m))
         for resolver in (*undamped(), weighted):
@@ -111,7 +111,7 @@ def test_every_resolver_does_the_task(shape: tuple[int, int], rng: np.random.Gen
 @each_shape
 def test_no_resolver_calls_solved_what_is_not(shape: tuple[int, int], rng: np.random.Generator) -> None:
     """The residual is ‖J u - rate‖, whatever a resolver guarantees, and decides the status."""
-    for _ in range(20):
+    for _ in range(10):
         problem = Example(shape, rng)
         lost = np.vstack([problem.J[:-1], np.zeros((1, problem.m))])
         for resolver, J in itertools.product(every(), (problem.J, 1e-3 * problem.J, lost)):
@@ -446,7 +446,7 @@ def test_numbers_whose_squares_overflow_are_not_called_solved(limited: str, size
         bounds = {"limit_rows": rng.normal(size=(2, m)), "lower": -np.ones(2), "upper": np.ones(2)}
     given = [["u0", "u1"], ["u1", "u2"], ["u2", "u3"]]
     damped = ReducedGradient(singular="damped")
-    for _ in range(40):
+    for _ in range(20):
         J = rng.normal(size=(s, m))
         J[rng.random((s, m)) < rng.choice([0.3, 1.0])] *= size
         rate = 3.6 * rng.normal(size=s) * rng.choice([1.0, 1e-160, 1e160])

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from function_grid import evaluated
 from numpy.typing import NDArray
 
 from nmm.control.controller import Controller
-from nmm.control.functions.function import Function
+from nmm.control.functions.function import Evaluation, Function
 from nmm.control.functions.objectives import Objective
 from nmm.control.functions.program import Program
 from nmm.model.robots.configuration import Configuration
@@ -51,25 +51,37 @@ def continuous(values: Array, near: Array, angular: list[bool]) -> Array:
 
 
 def values(function: Function, robot: Robot) -> Callable[[float, Array], Array]:
-    """A function's values at (t, q); laid out once, which takes longer than many evaluations."""
-    if isinstance(function, Objective):
-        return lambda t, q: np.array([function.value(Configuration(robot, q), t)])
-    program = Program(robot, (function,))
+    """A function's values at (t, q), an objective's by its terms; laid out once, which takes longer than many
+    evaluations."""
+    terms = function.terms() if isinstance(function, Objective) else ((1.0, function),)
+    program = Program(robot, [term for _, term in terms])
     program.lay_out()
-    return lambda t, q: program.evaluate(t, q)[0].value
+
+    def value(t: float, q: Array) -> Array:
+        evaluations = zip(terms, program.evaluate(t, q), strict=True)
+        first, *others = (weight * evaluation.value for (weight, _), evaluation in evaluations)
+        return np.asarray(sum(others, first))
+
+    return value
 
 
 def check_function(function: Function, robot: Robot, t: float, q: Array) -> None:
-    found = evaluated(function, t, Configuration(robot, q))
+    check_function_at(function, robot, [(t, q)])
+
+
+def check_function_at(function: Function, robot: Robot, points: Iterable[tuple[float, Array]]) -> None:
+    """At each t and q: both derivatives, and the value, which is that of the programs differentiated here."""
     angular = [row.angular for row in function.rows(robot)]
-
     near = values(function, robot)
+    for t, q in points:
+        found = evaluated(function, t, Configuration(robot, q))
+        np.testing.assert_array_equal(near(t, q), found.value)
 
-    def value(t: float, q: Array) -> Array:
-        return continuous(near(t, q), found.value, angular)
+        def value(t: float, q: Array, found: Evaluation = found) -> Array:
+            return continuous(near(t, q), found.value, angular)
 
-    assert_close(found.value_t, derivative(lambda h: value(t + h, q)))
-    assert_close(found.value_q, partials(lambda q: value(t, q), q))
+        assert_close(found.value_t, derivative(lambda h, t=t, q=q, value=value: value(t + h, q)))
+        assert_close(found.value_q, partials(lambda q, t=t, value=value: value(t, q), q))
 
 
 def check_equation(controller: Controller, t: float, q: Array) -> None:

@@ -123,7 +123,17 @@ FAULTS = [
 def tests_fail(package: Path, files: str) -> bool:
     """Whether tests fail with a package in the place of the checkout's."""
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(package)}
-    options = ["-q", "-x", "-p", "no:cacheprovider", "--no-header", "-m", "not browser", "-n", "0"]
+    options = [
+        "-q",
+        "-x",
+        "-p",
+        "no:cacheprovider",
+        "--no-header",
+        "-m",
+        "not browser and not thorough",
+        "-n",
+        "0",
+    ]
     python = [sys.executable, "-P"]  # -P: not the checkout's nmm
     command = [*python, "-m", "pytest", *options, *(f"tests/{file}" for file in files.split())]
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)

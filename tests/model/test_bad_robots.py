@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -1019,11 +1020,12 @@ def loading_error(path: Path) -> RobotError | None:
     return None
 
 
-def test_nothing_gets_past_the_checks(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("step", [4, pytest.param(1, marks=pytest.mark.thorough)])
+def test_nothing_gets_past_the_checks(step: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """Whatever is spoiled in a description: it loads, or one line says why not; never a word from C++."""
     path = tmp_path / "r.urdf"
     results = {True: 0, False: 0}
-    for text in spoiled():
+    for text in islice(spoiled(), 0, None, step):
         error = loading_error(write(path, text))
         if error is not None:
             assert str(error).isprintable()
@@ -1033,7 +1035,7 @@ def test_nothing_gets_past_the_checks(tmp_path: Path, capfd: pytest.CaptureFixtu
             assert all(one.code != "library_failed" for one in error.findings), text
         assert capfd.readouterr() == ("", ""), text
         results[error is None] += 1
-    assert min(results.values()) > 100
+    assert min(results.values()) > 100 // step
 
 
 def test_pinocchio_alone_would_not_say(capfd: pytest.CaptureFixture[str]) -> None:

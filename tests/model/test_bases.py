@@ -17,6 +17,7 @@ import yourdfpy
 from numpy.typing import NDArray
 from places import ROOT
 from surfaces import coincident, reach_down, surface
+from thinned import thinned
 
 from nmm.model.platforms import Car, DifferentialDrive, Layout, Mecanum, Tractor
 from nmm.model.robots.loading.measured_joints import Measured
@@ -73,8 +74,9 @@ VARIANTS = MappingProxyType(
 )
 CASES = [(name, i) for name in DEFAULTS for i in range(1 + len(VARIANTS[name]))]
 BASES = [name for name in DEFAULTS if name.endswith("_base")]
-each_case = pytest.mark.parametrize(("name", "variant"), CASES)
-each_base = pytest.mark.parametrize(("name", "variant"), [case for case in CASES if case[0] in BASES])
+ON_WHEELS = [case for case in CASES if case[0] in BASES]
+each_case = pytest.mark.parametrize(("name", "variant"), thinned(CASES, lambda case: case[1] < 2))
+each_base = pytest.mark.parametrize(("name", "variant"), thinned(ON_WHEELS, lambda case: case[1] < 2))
 each_robot = pytest.mark.parametrize("name", list(DEFAULTS))
 
 

@@ -59,7 +59,7 @@ BEYOND = {
 def test_beyond_a_bound_a_file_is_refused_by_its_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, what: str
 ) -> None:
-    monkeypatch.setattr(budget, "PATIENCE", 2.0)
+    monkeypatch.setattr(budget, "PATIENCE", 0.5)
     file = tmp_path / "robot.xacro"
     file.write_text(f"{HEAD}{text}</robot>", encoding="utf-8")
     began = time.process_time()
@@ -72,7 +72,7 @@ def test_beyond_a_bound_a_file_is_refused_by_its_name(
 
 
 def test_includes_that_multiply_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(budget, "PATIENCE", 2.0)
+    monkeypatch.setattr(budget, "PATIENCE", 0.5)
     for k in range(40):
         inside = 2 * f'<xacro:include filename="{k + 1}.xacro"/>' if k < 39 else ""
         (tmp_path / f"{k}.xacro").write_text(f"{HEAD}{inside}</robot>", encoding="utf-8")

@@ -18,6 +18,7 @@ import yourdfpy
 from numpy.typing import NDArray
 from places import ROOT
 from surfaces import coincident, reach_down, surface
+from thinned import thinned
 
 pytestmark = pytest.mark.usefixtures("xacro_each_time")
 
@@ -54,7 +55,9 @@ VARIANTS = MappingProxyType(
     }
 )
 CASES = [(robot, variant) for robot in DEFAULTS for variant in VARIANTS]
-each_case = pytest.mark.parametrize(("robot", "variant"), CASES)
+#: One variant for each of the lengths, on both sides of the axle.
+USUAL = {"default", "arm behind", "short links", "large wheels"}
+each_case = pytest.mark.parametrize(("robot", "variant"), thinned(CASES, lambda case: case[1] in USUAL))
 each_robot = pytest.mark.parametrize("robot", list(DEFAULTS))
 
 

@@ -489,6 +489,7 @@ def test_of_shapes_that_disagree_the_one_that_touches_the_root_links_plane_count
         assert [wheel.radius for wheel in made.robot.wheels] == [radius, radius]
 
 
+@pytest.mark.thorough
 def test_sound_robots_stand_on_their_wheels() -> None:
     """The bundled ones, and PAL's."""
     pal = "package://example-robot-data/robots/tiago{0}_description/robots/tiago{1}.urdf"

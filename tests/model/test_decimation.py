@@ -101,6 +101,7 @@ def shape_of(part: pin.GeometryObject) -> tuple[str, float]:
     return type(part.geometry).__name__, part.geometry.computeVolume()
 
 
+@pytest.mark.thorough
 def test_the_meshes_of_robots_stay_where_they_are() -> None:
     """A UR5's, to a thousandth of each mesh's size, from 95,694 triangles; what collides keeps all."""
     robot = nmm.load(UR5)

@@ -163,23 +163,43 @@ def tutorial(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def numbers_of(folder: Path, name: str) -> list[list[float]]:
-    """Those that a file prints, by line."""
+def numbers_of(folder: Path, name: str, *shorter: tuple[str, str]) -> list[list[float]]:
+    """Those that a file prints, by line; `shorter` is a text in it each, and what takes its place."""
+    code = (folder / name).read_text(encoding="utf-8")
+    for text, instead in shorter:
+        assert code.count(text) == 1, text
+        code = code.replace(text, instead)
+    name = "shorter.py" if shorter else name
+    (folder / name).write_text(code, encoding="utf-8")
     done = subprocess.run([sys.executable, name], cwd=folder, capture_output=True, text=True, check=True)
     lines = [re.findall(r"(?<![\w.])\d+(?:\.\d+)?", line) for line in done.stdout.splitlines()]
     return [[float(one) for one in line] for line in lines]
 
 
-def test_the_loop_of_the_tutorial_leads_mujocos_robot_as_far_as_odometry_goes(tutorial: Path) -> None:
-    for contact, _friction, off, drift, share in numbers_of(tutorial, "mujoco_loop.py"):
+#: One kind of contact instead of three, and 6 s of motion instead of 10.
+SHORTER = (
+    ("((0.004, 1.0), (0.004, 0.5), (0.02, 1.0))", "((0.004, 0.5),)"),
+    ("range(5000)", "range(3000)"),
+    ("k == 1000", "k == 300"),
+)
+
+
+@pytest.mark.parametrize("shorter", [SHORTER, pytest.param((), marks=pytest.mark.thorough)])
+def test_the_loop_of_the_tutorial_leads_mujocos_robot_as_far_as_odometry_goes(
+    tutorial: Path, shorter: tuple[tuple[str, str], ...]
+) -> None:
+    for contact, _friction, off, drift, share in numbers_of(tutorial, "mujoco_loop.py", *shorter):
         assert contact in (4.0, 20.0)
         assert abs(off - drift) <= 5.0  # mm: what the servos' lag adds
         assert 1.0 < drift < 100.0
         assert 5.0 < share < 100.0
 
 
-def test_computed_torques_are_those_foretold(tutorial: Path) -> None:
-    (platform, joints), (share, *_) = numbers_of(tutorial, "computed_torque.py")
+@pytest.mark.parametrize(
+    "shorter", [(("start, 4.0, 0.005)", "start, 1.0, 0.005)"),), pytest.param((), marks=pytest.mark.thorough)]
+)
+def test_computed_torques_are_those_foretold(tutorial: Path, shorter: tuple[tuple[str, str], ...]) -> None:
+    (platform, joints), (share, *_) = numbers_of(tutorial, "computed_torque.py", *shorter)
     assert platform <= 0.5  # mm
     assert joints <= 0.02
     assert share <= 1.0  # per cent

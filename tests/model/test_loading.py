@@ -281,7 +281,7 @@ def test_frames_climb_to_the_universe(robots: dict[str, Robot]) -> None:
 # ---------------------------------------------------------------------------------------------- geometry
 
 
-@pytest.mark.parametrize("name", ["ur5", "tiago_no_hand", "tree"])
+@pytest.mark.parametrize("name", ["ur5", pytest.param("tiago_no_hand", marks=pytest.mark.thorough), "tree"])
 def test_shapes_are_where_pinocchio_puts_them(name: str, tmp_path: Path, rng: np.random.Generator) -> None:
     path = FILES.get(name) or write(tmp_path / "tree.urdf", random_tree(rng, 8))
     loaded = load(path)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from gripping import FINGERS, folding, hitched, panda
 from numpy.typing import NDArray
 from places import DATA, PANDA
 from short_scenario import scenario
+from thinned import thinned
 from urdf_parts import inertial, joint, link, robot, write
 
 import nmm
@@ -80,7 +81,7 @@ def yourdfpy_knows_followers(file: Path) -> bool:
     return ElementTree.parse(file).getroot().find("joint/mimic") is not None
 
 
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("name", thinned(FILES, lambda name: "talos" not in name or name.endswith("v2.urdf")))
 def test_placements_and_jacobians_are_those_of_other_readers(name: str, rng: np.random.Generator) -> None:
     """Placements against yourdfpy; J_q S against central differences of yourdfpy and Pinocchio's mimic."""
     robot = nmm.load(DATA + name, platform="fixed", missing_meshes="skip")
@@ -341,8 +342,12 @@ def grasping(robot: Robot, q0: Array, duration: float) -> list[nmm.Task]:
     ]
 
 
-@pytest.mark.parametrize("method", ["rk4", "midpoint", "euler", "zoh", "adaptive"])
-@pytest.mark.parametrize("resolver", [nmm.ProjectedGradient(1.0), nmm.ReducedGradient(1.0)], ids=["pg", "rg"])
+PG, RG = nmm.ProjectedGradient(1.0), nmm.ReducedGradient(1.0)
+
+
+@pytest.mark.parametrize(
+    ("method", "resolver"), [("rk4", PG), ("midpoint", PG), ("adaptive", PG), ("euler", RG), ("zoh", RG)]
+)
 def test_a_gripper_closes_while_the_hand_moves(method: str, resolver: nmm.control.resolvers.Resolver) -> None:
     robot = panda("omni_base")
     assert (robot.n, robot.n_u) == (12, 11)
@@ -364,7 +369,8 @@ def test_a_gripper_closes_while_the_hand_moves(method: str, resolver: nmm.contro
 def test_an_offset_holds_exactly_over_a_long_run(tmp_path: Path) -> None:
     """Some 10 000 steps: what is rounded in one does not add up."""
     loaded = nmm.load(chained(tmp_path / "r.urdf"), platform="fixed")
-    swing = nmm.CallableReference(lambda t: 0.3 + 0.25 * np.sin(3.0 * t), 1, unit="rad")
+    breaks = np.linspace(0.0, 20.0, 201)
+    swing = nmm.Spline(breaks, 0.3 + 0.2 * np.sin(3.0 * breaks)[:, np.newaxis], unit="rad")
     controller = nmm.Controller(
         loaded, nmm.Task(nmm.LinearCoordinates("j"), swing, 5.0), nmm.ProjectedGradient()
     )
@@ -493,7 +499,7 @@ def test_a_scenario_runs_is_stored_and_read(tmp_path: Path) -> None:
     assert finger[0] == 0.03
     assert finger[-1] < 0.03
     np.testing.assert_array_equal(finger, follower)
-    run.save(tmp_path / "run")
+    run.save(tmp_path / "run", figures=False)
     again = nmm.Trajectory.load(tmp_path / "run")
     np.testing.assert_array_equal(again.q, run.q)
     assert again.robot.mimic_joints == run.robot.mimic_joints
@@ -610,10 +616,9 @@ def test_maps_move_followers_along() -> None:
 def test_info_and_the_viewer_tell_who_follows(capsys: pytest.CaptureFixture[str]) -> None:
     assert status_of(["info", PANDA, "--platform", "fixed"]) == 0
     assert capsys.readouterr().out.count("panda_finger_joint2 = panda_finger_joint1") == 1
-    robot = panda("omni_base")
+    robot = folding()
+    (follower,) = robot.mimic_joints
     (joints,) = [command for command in viewer_scene(robot, robot.rest) if command["type"] == "joints"]
     listed = {one["name"]: one["follows"] for one in joints["coordinates"]}
-    assert listed.pop(FINGERS[1]) == {
-        "joint": FINGERS[1], "leader": FINGERS[0], "multiplier": 1.0, "offset": 0.0
-    }  # fmt: skip
+    assert listed.pop(follower.joint) == asdict(follower)
     assert not any(listed.values())

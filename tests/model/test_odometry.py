@@ -250,10 +250,20 @@ def rolled(steps: Array, turn: str, start: float = 0.0, dt: float | None = None,
     return np.asarray(odometry.q)
 
 
-@pytest.mark.parametrize("turn", ["half", "whole"])
-@pytest.mark.parametrize("start", [0.0, 3.14, -2.0])
-@pytest.mark.parametrize("dt", [None, 0.02])
-@pytest.mark.parametrize("options", [{}, {"wrapped": True}, {"wrapped": [*WHEELS]}])
+@pytest.mark.parametrize(
+    ("turn", "start", "dt", "options"),
+    [  # each two of their values together
+        ("half", 0.0, None, {}),
+        ("half", 3.14, 0.02, {"wrapped": True}),
+        ("half", -2.0, None, {"wrapped": [*WHEELS]}),
+        ("half", -2.0, 0.02, {}),
+        ("whole", 0.0, 0.02, {"wrapped": [*WHEELS]}),
+        ("whole", 0.0, None, {"wrapped": True}),
+        ("whole", 3.14, None, {}),
+        ("whole", 3.14, 0.02, {"wrapped": [*WHEELS]}),
+        ("whole", -2.0, None, {"wrapped": True}),
+    ],
+)
 @pytest.mark.filterwarnings("ignore:.*read within one turn:RuntimeWarning")
 def test_wheels_that_are_read_within_one_turn(
     turn: str, start: float, dt: float | None, options: dict[str, Any]

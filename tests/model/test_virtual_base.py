@@ -76,10 +76,18 @@ def test_a_base_of_joints_turns_where_it_stands(tmp_path: Path, joints: tuple[tu
     np.testing.assert_allclose(ahead.homogeneous, slid.homogeneous, atol=1e-12)
 
 
-@pytest.mark.parametrize("end", [0.3, 20.0, 999999.0])
-@pytest.mark.parametrize("joints", [(AHEAD, ASIDE), (ASIDE, AHEAD), (AHEAD, ("prismatic", "1 1 0"))])
+@pytest.mark.parametrize(
+    ("end", "joints"),
+    [
+        (0.3, (AHEAD, ASIDE)),
+        (20.0, (AHEAD, ASIDE)),
+        (999999.0, (ASIDE, AHEAD)),
+        (0.3, (AHEAD, ("prismatic", "1 1 0"))),
+        (999999.0, (AHEAD, ("prismatic", "1 1 0"))),
+    ],
+)
 def test_two_slides_without_a_turn_are_a_gantry(
-    tmp_path: Path, joints: tuple[tuple[str, str], ...], end: float
+    tmp_path: Path, end: float, joints: tuple[tuple[str, str], ...]
 ) -> None:
     path = write(tmp_path / "gantry.urdf", based(*joints, end=end, offset="0.1 0 0.2"))
     loaded = nmm.load(path)

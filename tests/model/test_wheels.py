@@ -149,7 +149,7 @@ def test_no_wheel_slips_where_it_touches_the_ground(base: Callable[[str], Robot]
     model = robot.display_model
     data = model.createData()
     slides = isinstance(robot.platform, Omnidirectional)
-    for _ in range(20):
+    for _ in range(10):
         q, u = random_state(robot, rng)
         angles = rolling.settled(q, u)
         trailing = np.array([swivel.trail != 0.0 for swivel in rolling._swivels], dtype=bool)

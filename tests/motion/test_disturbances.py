@@ -29,7 +29,7 @@ def scenario(disturbances: dict[str, object], **more: object) -> nmm.Scenario:
 
 def test_a_run_is_its_rollout_to_the_last_bit(tmp_path: Path) -> None:
     given = {**WORN, "creep": -0.01, "noise": 1e-3, "delay": 2, "correct": 0.4, "seed": 3}
-    of_file = scenario(given, duration=3.0)
+    of_file = scenario(given, duration=1.5)
     found = of_file.run()
     rolled = nmm.rollout(of_file, keep=("q", "u", "error", "believed"))
     for name in ("q", "u", "error", "believed"):
@@ -37,7 +37,7 @@ def test_a_run_is_its_rollout_to_the_last_bit(tmp_path: Path) -> None:
     assert found["drift"][-1] == rolled["drift"][0] > 0.0
     parts = of_file.parts
     by_hand = nmm.Disturbances(**{**given, "slip": [0.9988, 0.9985, 1.0, 1.0]})
-    same = nmm.simulate(of_file.controller(), parts.q0, 3.0, parts.dt, "zoh", disturbances=by_hand)
+    same = nmm.simulate(of_file.controller(), parts.q0, 1.5, parts.dt, "zoh", disturbances=by_hand)
     assert np.array_equal(found.q, same.q)
     path = tmp_path / "resolved.yaml"
     path.write_text(yaml.safe_dump(of_file.resolved()), "utf-8")

@@ -158,9 +158,16 @@ def test_a_run_whose_feedback_is_bounded_keeps_its_promise(
     assert [one.code for one in late.verdict.warnings[-1]] == ["promise_left", "inputs_fell_short"]
 
 
-@pytest.mark.parametrize("method", ["euler", "midpoint", "rk4", "zoh", "adaptive"])
-@pytest.mark.parametrize("gain", [None, 1.0, 5.0])
-def test_honest_runs_keep_their_promise(robot_2r: Robot, method: str, gain: float | None) -> None:
+@pytest.mark.parametrize(
+    ("gain", "method"),
+    [
+        *((None, method) for method in ("euler", "midpoint", "rk4", "zoh")),
+        (1.0, "rk4"),
+        (5.0, "zoh"),
+        (5.0, "adaptive"),
+    ],
+)
+def test_honest_runs_keep_their_promise(robot_2r: Robot, gain: float | None, method: str) -> None:
     task = nmm.Task(TIP.function, TIP.reference, gain)
     for dt in (0.002, 0.02):
         run = nmm.simulate(nmm.Controller(robot_2r, task, nmm.ReducedGradient()), START, 4.0, dt, method)

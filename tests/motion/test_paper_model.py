@@ -182,7 +182,7 @@ def test_planar_arm_over_the_axle_is_singular() -> None:
 def test_platform_block_is_always_regular_if_d_exceeds_the_arm(d: float, vanishes: bool) -> None:
     """|Δ12| >= d - l1 - l2 with equality for the arm folded back; if d < l1 + l2, Δ12 changes its sign."""
     robot = load("unicycle_2r", arguments={"d": d})
-    angles = np.linspace(-pi, pi, 25)
+    angles = np.linspace(-pi, pi, 13)
     minors = [
         np.linalg.det(jacobian(Configuration(robot, [0, 0, -1.0, q1, q2]), Position("ee", "xy"))[:, :2])
         for q1, q2 in itertools.product(angles, angles)

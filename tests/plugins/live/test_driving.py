@@ -610,7 +610,7 @@ def test_a_function_that_raises_stops_the_robot_and_not_the_loop() -> None:
 # the command
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGKILL"])
+@pytest.mark.parametrize("name", [pytest.param("SIGINT", marks=pytest.mark.thorough), "SIGKILL"])
 def test_nothing_stays_behind(tmp_path: Path, name: str) -> None:
     running, url = page_of(tmp_path, "drive", "unicycle_3r_position")
     port = int(url.rsplit(":", 1)[1].strip("/"))

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import page_of, process
+from command_line import page_of
 from live_pages import LivePage, dead_page, live, unpacked
 from ports import MOST, listening, wait_for
 
@@ -26,7 +26,7 @@ from nmm.views.playback import LiveRun
 
 DT = 0.005
 SHORT = ("--set", "duration=0.5")
-LONG = ("--set", "duration=20000")
+LONG = ("--set", "duration=5000")
 
 
 def scenario(name: str = "unicycle_3r_position", **settings: object) -> nmm.Scenario:
@@ -236,9 +236,8 @@ def test_an_answer_counts_once_and_others_count_nothing() -> None:
 
 
 def test_the_command_shows_computes_and_plays(tmp_path: Path) -> None:
-    short = ("unicycle_2r_position", *SHORT)
-    assert process(tmp_path, "run", *short, "--out", "plain").wait(MOST) == 0
-    running, url = page_of(tmp_path, "run", "--play", *short, "--out", "shown")
+    scenario("unicycle_2r_position", duration=0.5).run().save(tmp_path / "plain", figures=False)
+    running, url = page_of(tmp_path, "run", "--play", "unicycle_2r_position", *SHORT, "--out", "shown")
     with LivePage(url) as page:
         wait_for(lambda: bool(page.of("whole")))
     running.send_signal(signal.SIGINT)
@@ -267,7 +266,7 @@ def test_ended_while_the_folder_is_written_it_does_not_stay(tmp_path: Path) -> N
     assert (tmp_path / "here/motion.png").exists()
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGKILL"])
+@pytest.mark.parametrize("name", ["SIGINT", pytest.param("SIGKILL", marks=pytest.mark.thorough)])
 def test_nothing_stays_behind(tmp_path: Path, name: str) -> None:
     """Ended in the middle of a long run."""
     running, url = page_of(tmp_path, "run", "--play", "unicycle_2r_position", *LONG, "--out", "here")
@@ -284,5 +283,5 @@ def test_nothing_stays_behind(tmp_path: Path, name: str) -> None:
         assert list(tmp_path.iterdir()) == []
     else:
         assert running.returncode == 1
-        assert re.search(r"nmm run: RG interrupted: interrupted after .* s of 20000 s", err)
+        assert re.search(r"nmm run: RG interrupted: interrupted after .* s of 5000 s", err)
         assert (tmp_path / "here/summary.json").exists()

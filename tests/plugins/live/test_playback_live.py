@@ -102,7 +102,11 @@ def children(pid: int) -> list[str]:
 
 @pytest.mark.parametrize(
     ("number", "status"),
-    [(signal.SIGINT, 0), (signal.SIGTERM, -signal.SIGTERM), (signal.SIGKILL, -signal.SIGKILL)],
+    [
+        (signal.SIGINT, 0),
+        pytest.param(signal.SIGTERM, -signal.SIGTERM, marks=pytest.mark.thorough),
+        pytest.param(signal.SIGKILL, -signal.SIGKILL, marks=pytest.mark.thorough),
+    ],
 )
 def test_nothing_stays_behind(tmp_path: Path, number: signal.Signals, status: int) -> None:
     process, port = start_player(tmp_path)

@@ -28,6 +28,7 @@ from ports import MOST
 
 import nmm
 from nmm.base.errors import InputError, RunError
+from nmm.cli.exit_status import status_of
 from nmm.model.robots.robot import Robot
 from nmm.plugins.live.rendering import encoder, render
 from nmm.plugins.live.rendering.chromium import HeadlessPage
@@ -181,13 +182,16 @@ def test_what_is_missing_is_named(
     assert [path.name for path in tmp_path.iterdir()] == ["chromium"]
 
 
-def test_the_command_says_what_is_wrong(tmp_path: Path) -> None:
+def test_the_command_says_what_is_wrong(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
     for arguments, words in (
         (["nothing", "--video", "a.mp4"], "nothing"),
         (["nothing", "--video", "a.mp4", "--size", "big"], "WIDTHxHEIGHT"),
     ):
-        running = process(tmp_path, "render", *arguments)
-        out, err = running.communicate(timeout=MOST)
-        assert (running.returncode, out) == (2, "")
+        status = status_of(["render", *arguments])
+        out, err = capfd.readouterr()
+        assert (status, out) == (2, "")
         assert err.startswith("nmm render: ")
         assert words in err

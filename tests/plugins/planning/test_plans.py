@@ -65,7 +65,7 @@ def ahead(word):
 @pytest.mark.parametrize("words_of", [words.reeds_shepp, words.dubins])
 def test_words_lead_where_they_should(words_of):
     rng, word = np.random.default_rng(0), np.zeros((words.PARTS, 2))
-    for x, y, phi in rng.uniform([-4, -4, -np.pi], [4, 4, np.pi], (3000, 3)):
+    for x, y, phi in rng.uniform([-4, -4, -np.pi], [4, 4, np.pi], (1000, 3)):
         length = words_of(x, y, phi, word)
         found = ahead(word)
         assert np.allclose(found[:2], (x, y), atol=1e-9)
@@ -275,7 +275,7 @@ def test_a_seed_gives_one_plan():
 def test_more_shortening_gives_no_longer_plan():
     """Where legs are cut the robot stops once more: that counts, too."""
     robot = nmm.load("unicycle_3r")
-    for seed in range(3):
+    for seed in range(2):
         durations = [
             nmm.plan(robot, robot.rest, BEHIND, [WALL], limits=LIMITS, shorten=count, seed=seed).duration
             for count in (0, 100, 1500)

@@ -48,6 +48,7 @@ def test_a_robot_on_its_plan_has_the_rest_of_it(plans):
         check(on)
 
 
+@pytest.mark.thorough
 def test_what_is_free_of_a_plan_spares_looks_at_motions():
     """Between two walls a post stands on the plan: the search begins with the parts that are free."""
     robot, spared, new = nmm.load("unicycle_3r"), 0, 0

@@ -226,7 +226,7 @@ def test_a_part_that_comes_no_more_is_noticed() -> None:
     assert states.joints["q1"] == 0.3
 
 
-@pytest.mark.parametrize("name", ["unicycle_3r", "cart"])
+@pytest.mark.parametrize("name", [pytest.param("unicycle_3r", marks=pytest.mark.thorough), "cart"])
 def test_the_node_s_logic_leads_a_robot_by_messages_alone(name: str, tmp_path: Path) -> None:
     """docs/tutorials/follow.py: its robot is q_dot = S(q) u, which gets and sends messages. The cart is a car
     that steers as v and ω ask, with a mimic joint; its joints come in two messages, with others."""

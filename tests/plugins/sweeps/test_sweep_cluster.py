@@ -28,13 +28,23 @@ def sweep(tmp_path: Path) -> nmm.Sweep:
     return nmm.Sweep(path, vary, samples=16, seed=5, settings={"duration": 0.2})
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def scheduler() -> Iterator[str]:
     """Without workers."""
     with LocalCluster(n_workers=0, processes=True, dashboard_address=None) as made:
         yield made.scheduler_address
 
 
+def test_a_clusters_table_is_the_local_one_bit_for_bit(sweep: nmm.Sweep, tmp_path: Path) -> None:
+    local = sweep.run(tmp_path / "local", jobs=1)
+    with LocalCluster(n_workers=2, processes=False, dashboard_address=None) as workers:
+        far = sweep.run(tmp_path / "far", scheduler=workers.scheduler_address)
+    assert far.table.equals(local.table)
+    tables = [(swept.folder / "rows.parquet").read_bytes() for swept in (local, far)]
+    assert tables[0] == tables[1]
+
+
+@pytest.mark.thorough
 def test_a_worker_is_killed_and_the_table_is_the_local_one_bit_for_bit(
     sweep: nmm.Sweep, tmp_path: Path
 ) -> None:

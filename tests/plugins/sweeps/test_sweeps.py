@@ -182,13 +182,13 @@ def test_threads_and_controllers_used_again_change_no_cell(short: Path) -> None:
     """Other starts, of which some are refused, and other gains, some too large for dt, by several threads."""
     vary = {"q0.q1": (-4, 4), "task.gain": [1, 4, 1e6], "resolver.kind": ["rg", "pg"]}
     settings = {"duration": 0.2}
-    definition = nmm.Sweep(short, vary, samples=6, settings=settings).definition
+    definition = nmm.Sweep(short, vary, samples=3, settings=settings).definition
     told: list[float] = []
-    rows = rows_of(definition, range(36), progress=told.append, threads=3)
-    assert rows == rows_of(definition, range(36)) == rows_of(definition, range(36))
-    assert told == [(k + 1) / 36 for k in range(36)]
+    rows = rows_of(definition, range(18), progress=told.append, threads=3)
+    assert rows == rows_of(definition, range(18)) == rows_of(definition, range(18))
+    assert told == [(k + 1) / 18 for k in range(18)]
     assert len({row["outcome"] for row in rows}) > 1
-    for row, changes in zip(rows, definition.changes(range(36)), strict=True):
+    for row, changes in zip(rows, definition.changes(range(18)), strict=True):
         if row["outcome"] == "refused":
             with pytest.raises(nmm.InputError, match=re.escape(row["message"])):
                 nmm.Scenario.load(short, {**settings, **changes}).run()
@@ -303,10 +303,13 @@ def test_interrupted_anywhere_it_goes_on_to_the_same_bytes(
     assert bytes_of[0] == bytes_of[1]
 
 
-@pytest.mark.parametrize("other", ["resolver.kind=rg,pg", "robot.arguments.d=0.2,0.4"])
+@pytest.mark.parametrize(
+    "other",
+    [pytest.param("resolver.kind=rg,pg", marks=pytest.mark.thorough), "robot.arguments.d=0.2,0.4"],
+)
 def test_killed_and_started_again_nothing_is_lost_or_doubled(short: Path, tmp_path: Path, other: str) -> None:
     """Two threads, or processes where robots change; killed as by the system; then on to the end."""
-    vary = ["--vary", "q0.x=-1:1", "--vary", other, "--samples", "40", "--set", "duration=1"]
+    vary = ["--vary", "q0.x=-1:1", "--vary", other, "--samples", "40", "--set", "duration=0.4"]
     began = process(tmp_path, "sweep", str(short), *vary, "--out", "out", "--jobs", "2")
     while len(list((tmp_path / "out").glob("parts/*.parquet"))) < 2:
         assert began.poll() is None, began.communicate()
@@ -315,7 +318,7 @@ def test_killed_and_started_again_nothing_is_lost_or_doubled(short: Path, tmp_pa
     began.communicate()
     assert 2 <= len(list((tmp_path / "out").glob("parts/*.parquet"))) < 10
     key, values = other.split("=")
-    sweep = nmm.Sweep(short, {"q0.x": (-1, 1), key: values}, samples=40, settings={"duration": 1})
+    sweep = nmm.Sweep(short, {"q0.x": (-1, 1), key: values}, samples=40, settings={"duration": 0.4})
     shares: list[float] = []
     table = sweep.run(tmp_path / "out", jobs=1, progress=shares.append).table
     assert shares[0] >= 0.2

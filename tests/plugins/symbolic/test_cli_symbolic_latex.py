@@ -60,7 +60,14 @@ def test_the_reader_tells_formulas_apart() -> None:
     )
 
 
-@pytest.mark.parametrize("subject", SUBJECTS, ids=" ".join)
+@pytest.mark.parametrize(
+    "subject",
+    [
+        pytest.param(subject, marks=pytest.mark.thorough if subject in SUBJECTS[1:4:2] else ())
+        for subject in SUBJECTS
+    ],
+    ids=" ".join,
+)
 def test_all_that_symbolic_says(subject: tuple[str, ...], run: Command) -> None:
     text, body = run(*subject), run(*subject, "--latex")
     assert (body.status, body.err) == (0, "")

@@ -28,6 +28,7 @@ import sympy
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from symbolic_checks import PAPER, TASKS, made
+from thinned import thinned
 
 from nmm.base.errors import InputError
 from nmm.base.findings import Finding
@@ -95,7 +96,9 @@ def test_no_singularity_with_d(robot: str, task: str, rng: np.random.Generator) 
         assert np.min(np.linalg.svd(J)[1]) > 0.02 * abs(given["d"])
 
 
-@pytest.mark.parametrize(("robot", "task"), PAPER)
+@pytest.mark.parametrize(
+    ("robot", "task"), thinned(PAPER, lambda case: case[1] not in ("pointing", "link heading"))
+)
 def test_what_d_zero_does(robot: str, task: str, rng: np.random.Generator) -> None:
     analysis = made(robot, task)[2]
     claim = singular_set(analysis, zero=["d"])

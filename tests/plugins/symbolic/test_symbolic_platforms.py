@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from platform_grid import EXAMPLES, random_qp
 from symbolic_checks import check_numbers, made
+from thinned import thinned
 from urdf_parts import LIMIT, inertial, joint, link, write
 from urdf_parts import robot as urdf
 
@@ -41,6 +42,13 @@ LEVEL = '<axis xyz="0 1 0"/>'
 #: Inputs of its own choice make it divide by square roots.
 WITHOUT = "wheeled, two steered"
 TRACED = {name: platform for name, platform in EXAMPLES.items() if name != WITHOUT}
+#: Those that are another with other numbers, or another's class described by its wheels.
+SIMILAR = {
+    *("differential", "differential_of_a_truck", "skid_steer", "car_without_limit", "mecanum_wide"),
+    *("front_drive_car_without_limit", "tractor_on_axle", "tractor_three", "wheeled, axle"),
+    *("wheeled, trailers", "wheeled, hitch with nothing", "wheeled, omni", "wheeled, mecanum"),
+    "wheeled, axles and a driven caster",
+}
 
 
 def robot_on(platform: Platform, folder: Path) -> Robot:
@@ -70,7 +78,7 @@ def configurations(robot: Robot, rng: np.random.Generator, count: int = 3) -> li
     ]
 
 
-@pytest.mark.parametrize("name", TRACED)
+@pytest.mark.parametrize("name", thinned(TRACED, lambda name: name not in SIMILAR))
 def test_every_platform(name: str, rng: np.random.Generator, tmp_path: Path) -> None:
     robot = robot_on(TRACED[name], tmp_path)
     tasks: list[Any] = [[Position("ee", "z"), Heading("arm")]]
@@ -128,7 +136,11 @@ TASKS: dict[str, tuple[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("name", TASKS)
+#: What the same formulas write as another task does.
+SLOW = {"pointing backwards", "two distances", "distance of frames", "pointing at a frame"}
+
+
+@pytest.mark.parametrize("name", thinned(TASKS, lambda name: name not in SLOW))
 def test_every_task(name: str, rng: np.random.Generator) -> None:
     kind, task = TASKS[name]
     robot = made(f"unicycle_{kind}", "position" if kind == "2r" else "spatial position")[0]

@@ -19,7 +19,7 @@ from urdf_parts import robot as urdf
 import nmm
 from nmm.base.findings import Finding
 from nmm.control.functions.tasks import CenterOfMass, Orientation, Pose, Position, Posture
-from nmm.plugins.symbolic import TooLarge, never_zero, singular_set, symbolic
+from nmm.plugins.symbolic import TooLarge, from_robot, never_zero, singular_set, symbolic
 
 
 @pytest.mark.parametrize("seen_from", [None, "link2"])
@@ -120,6 +120,18 @@ def test_joints_of_every_kind_however_placed(
         assert not analysis.notes
 
 
+#: Whether work is counted up to a tenth of what a user's analysis may take, or all of it.
+each_budget = pytest.mark.parametrize("whole", [False, pytest.param(True, marks=pytest.mark.thorough)])
+
+
+@pytest.fixture
+def _budget(whole: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not whole:
+        monkeypatch.setattr(from_robot, "BUDGET", from_robot.BUDGET // 10)
+
+
+@each_budget
+@pytest.mark.usefixtures("_budget")
 @pytest.mark.parametrize(
     ("robot", "frame", "task"),
     [
@@ -139,6 +151,8 @@ def test_what_is_too_large_is_refused_and_says_why(robot: Any, frame: str, task:
         symbolic(made_robot, task(frame))
 
 
+@each_budget
+@pytest.mark.usefixtures("_budget")
 def test_general_angles_between_the_axes_are_named_where_they_make_formulas_too_large(tmp_path: Path) -> None:
     parts, last = [link("l", inertial(2.0, "0.1 0 0.2"))], "l"
     for i in range(4):
