@@ -37,22 +37,26 @@ def sideways_speeds(robot: Robot, q: Array, q_dot: Array) -> dict[str, tuple[int
     some = np.unique(np.linspace(0, len(q) - 1, min(_MOST, len(q))).astype(int))
     rows = dict(zip(*wheel_rates(robot), strict=True))
     model, data = robot.model, robot.model.createData()
-    sideways, speeds = np.zeros((2, len(some), len(wheels)))
     carriers = [model.getJointId(wheel.carrier) for wheel in wheels]
+    # By sample and wheel: the carrier's velocities, and the wheel's centre and axis in its frame.
+    linear, angular, center, axis = np.zeros((4, len(some), len(wheels), 3))
     for k, sample in enumerate(some):
         pin.forwardKinematics(model, data, q[sample], q_dot[sample])
         for i, (wheel, joint) in enumerate(zip(wheels, carriers, strict=True)):
-            center, axis = wheel.center, wheel.axis
+            center[k, i], axis[k, i] = wheel.center, wheel.axis
             if wheel.swivel:
                 if wheel.joint not in rows:
                     continue  # a caster, which follows
                 row = rows[wheel.joint]
                 cosine, sine, _ = following(row, float(steered_by(row, q[sample : sample + 1])[0]))
                 turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-                center, axis = wheel.pivot + turn @ (center - wheel.pivot), turn @ axis
+                center[k, i] = wheel.pivot + turn @ (wheel.center - wheel.pivot)
+                axis[k, i] = turn @ wheel.axis
             motion = pin.getVelocity(model, data, joint, pin.ReferenceFrame.LOCAL)
-            velocity = motion.linear + np.cross(motion.angular, center)
-            sideways[k, i], speeds[k, i] = abs(float(velocity @ axis)), float(np.linalg.norm(velocity))
+            linear[k, i], angular[k, i] = motion.linear, motion.angular
+    velocity = linear + np.cross(angular, center)
+    sideways = np.abs(np.einsum("kij,kij->ki", velocity, axis))
+    speeds = np.linalg.norm(velocity, axis=2)
     over = sideways - np.maximum(SLOW, ROUNDED * speeds)
     worst = over.argmax(axis=0)
     return {
