@@ -62,7 +62,9 @@ def test_strangers_are_where_pinocchio_has_them(file: str) -> None:
     agree(nmm.load(DATA + file, platform="fixed"))
 
 
-@pytest.mark.parametrize("name", thinned(bundled_scenarios(), lambda name: name in bundled_scenarios()[::2]))
+@pytest.mark.parametrize(
+    "name", thinned(bundled_scenarios(), lambda name: name in list(bundled_scenarios())[::2])
+)
 def test_controllers_answer_the_same(name: str) -> None:
     scenario = nmm.Scenario.load(name)
     usual = scenario.controller()
