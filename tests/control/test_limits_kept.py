@@ -44,7 +44,7 @@ def towards(
 )
 def test_a_random_motion_keeps_position_velocity_and_acceleration(name: str, method: str) -> None:
     controller, q0 = wanderer(name)
-    broken = wander(controller, q0, 2000 if method == "zoh" else 500, method=method)
+    broken = wander(controller, q0, 1000 if method == "zoh" else 500, method=method)
     assert max(broken) <= 1e-11
 
 

@@ -369,8 +369,9 @@ def test_a_target_out_of_reach_is_said_to_be(axes: str) -> None:
 # Advice
 
 
-@pytest.mark.parametrize("method", ["euler", "midpoint", "rk4", "zoh"])
-@pytest.mark.parametrize("alpha", [300.0, 1000.0])
+@pytest.mark.parametrize(
+    ("method", "alpha"), [("euler", 300.0), ("midpoint", 1000.0), ("rk4", 300.0), ("zoh", 1000.0)]
+)
 def test_advice_on_dt_holds(method: str, alpha: float) -> None:
     changes = {"resolver.alpha": alpha, "dt": 0.01, "method": method, "duration": 2}
     run = nmm.Scenario.load("unicycle_2r_position", changes).run()
