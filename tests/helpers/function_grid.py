@@ -202,6 +202,7 @@ def _references() -> Iterator[Entry]:
     yield Entry("circle", Circle([2, 2], 3, 0.08 * pi, 5 / 4 * pi))
     for plane in ("xy", "yz", "zx"):
         yield Entry(f"circle in {plane}", Circle([2, -1, 0.5], 0.7, -1.3, 0.4, plane))
+    yield Entry("circle with a run-up", Circle([2, 2], 3, 0.5, run_up=2.4))
     yield Entry("constant", Constant([1.0, -2.0]))
     yield Entry("constant number", Constant(0.7, "rad"))
     for profile in ("constant", "smooth"):
