@@ -114,6 +114,7 @@ def test_the_number_of_threads_changes_no_bit(
             np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.thorough
 def test_a_map_of_the_workspace_is_the_same_with_any_number_of_threads(
     robot_3r: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:

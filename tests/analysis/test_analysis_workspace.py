@@ -191,6 +191,7 @@ def test_the_slab_holds_the_frame_and_the_platform_stands(robot_3r: Robot) -> No
         np.testing.assert_array_equal(q[:3], [1.0, -0.5, 0.3])
 
 
+@pytest.mark.thorough
 def test_no_posture_drawn_is_better_than_the_best_or_worse_than_the_worst(ur5: Robot) -> None:
     """Each brought to its cell's middle, by the pseudoinverse, as far as no limit and no leap is met."""
     subject, frame = (ur5, Position("tool0")), "tool0"

@@ -127,6 +127,7 @@ def delayed(gain: float, delay: int, compensated: bool) -> float:
     return float(np.abs(error[-50:]).max() / np.abs(error[0]).max())
 
 
+@pytest.mark.thorough
 def test_a_delay_is_borne_that_would_make_a_loop_without_foresight_unstable() -> None:
     """ė = -K e(t - τ) is unstable from K τ = π / 2 on, less half a sample that inputs are held."""
     assert delayed(2.0, 32, compensated=False) < 0.5  # K τ = 1.30

@@ -159,7 +159,10 @@ print([one.py_func.__name__ for one, n in zip(made, before) if len(one.entries) 
 
 
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
-@pytest.mark.parametrize("retreat", ["None", "nmm.Retreat(stalled=0.1, durations=[0.2])"])
+@pytest.mark.parametrize(
+    "retreat",
+    [pytest.param("None", marks=pytest.mark.thorough), "nmm.Retreat(stalled=0.1, durations=[0.2])"],
+)
 def test_no_call_along_the_way_loads_code(retreat):
     """All that a call may need is loaded when the controller is made: else 25 ms within a control loop."""
     command = [sys.executable, "-c", f"import nmm\nRETREAT = {retreat}\n{FIRST_CALLS}"]

@@ -31,7 +31,9 @@ SHAPES = {
 }
 
 
-@pytest.fixture(scope="module", params=["unicycle_3r", "tiago_pose"])
+@pytest.fixture(
+    scope="module", params=["unicycle_3r", pytest.param("tiago_pose", marks=pytest.mark.thorough)]
+)
 def scene(request):
     robot = (
         nmm.load(request.param)

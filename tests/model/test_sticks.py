@@ -243,7 +243,7 @@ def test_links_are_drawn_by_their_collision_shapes_first(tmp_path: Path) -> None
     assert all(not geometry.overrideMaterial for geometry in robot.collision_model.geometryObjects)
 
 
-@pytest.mark.parametrize("source", ["unicycle_2r", UR5])
+@pytest.mark.parametrize("source", ["unicycle_2r", pytest.param(UR5, marks=pytest.mark.thorough)])
 def test_robots_with_shapes_are_drawn_as_before(source: str, monkeypatch: pytest.MonkeyPatch) -> None:
     robot = nmm.load(source)
     motion = drive(robot, duration=0.5, dt=0.05, frame=None)

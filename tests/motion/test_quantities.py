@@ -256,6 +256,7 @@ def test_a_quantity_that_a_step_knows_is_two_files(tmp_path: Path) -> None:
     assert ran.returncode == 0, ran.stderr
 
 
+@pytest.mark.thorough
 def test_one_that_nothing_writes_is_refused(tmp_path: Path) -> None:
     ran = with_files_changed(tmp_path, ["control/step/quantities.py"])
     last = ran.stderr.strip().splitlines()[-1]

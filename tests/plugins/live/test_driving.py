@@ -336,6 +336,7 @@ def led(driven: Driven, planning: Planning, until: Callable[[], bool]) -> list[A
     return places
 
 
+@pytest.mark.thorough
 def test_a_target_behind_a_wall_is_planned_to_and_again_when_it_moves() -> None:
     """Its inputs are the plan's, not those of the controller that follows targets; distances by Coal."""
     driven = Driven(scenario("behind_the_wall"))

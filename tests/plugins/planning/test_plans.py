@@ -272,6 +272,7 @@ def test_a_seed_gives_one_plan():
     assert not np.array_equal(a.corners[-2], c.corners[-2])
 
 
+@pytest.mark.thorough
 def test_more_shortening_gives_no_longer_plan():
     """Where legs are cut the robot stops once more: that counts, too."""
     robot = nmm.load("unicycle_3r")
@@ -387,6 +388,7 @@ def test_a_plan_in_a_folder_is_read_and_run_again(tmp_path):
     assert np.array_equal(again.q, run.q)
 
 
+@pytest.mark.thorough
 def test_compare_runs_the_plan_and_each_resolver_without_it(tmp_path, capfd):
     from nmm.cli.exit_status import status_of
 

@@ -146,6 +146,7 @@ def test_a_goal_out_of_the_arms_reach_and_one_without_a_way_say_so(ur5_unicycle)
     assert "reach" in str(found.value)
 
 
+@pytest.mark.thorough
 def test_the_command_line_holds_a_frame(tmp_path, capsys):
     settings = ("--hold", HAND, "--to", "x=0.1,y=0.1,theta=0.3", "--out", str(tmp_path / "out"), "--json")
     assert status_of(("plan", "ur5_unicycle_pose", *settings)) == 0

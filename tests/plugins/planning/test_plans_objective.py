@@ -30,7 +30,7 @@ def mean(plan: nmm.Plan, objective: nmm.extending.Objective) -> float:
     return float(np.mean([objective.value(nmm.Configuration(plan.robot, one)) for one in q]))
 
 
-@pytest.mark.parametrize("objective", [-3.0 * W, 10.0 * FAR_OFF])
+@pytest.mark.parametrize("objective", [-3.0 * W, pytest.param(10.0 * FAR_OFF, marks=pytest.mark.thorough)])
 def test_a_plan_has_less_of_its_objective_in_the_same_time_and_keeps_all(
     objective: nmm.extending.Objective,
 ) -> None:
@@ -46,7 +46,7 @@ def test_a_plan_has_less_of_its_objective_in_the_same_time_and_keeps_all(
     assert run.objective[3] == pytest.approx(objective.value(here), abs=1e-9)
 
 
-@pytest.mark.parametrize("factor", [0.0, 1e300])
+@pytest.mark.parametrize("factor", [0.0, pytest.param(1e300, marks=pytest.mark.thorough)])
 def test_an_objective_that_nothing_lowers_leaves_the_plan_as_it_is_to_the_bit(factor: float) -> None:
     """Of no weight, or infinite."""
     infinite = nmm.Quadratic(nmm.QuadraticTerm("q1", 9.0, 1e300))

@@ -31,6 +31,7 @@ def check_end(plan, goal):
         assert abs(2.0 * np.sin(0.5 * off) if name == "theta" else off) < 1e-9
 
 
+@pytest.mark.thorough
 def test_a_train_gets_to_a_pose(train):
     start = {"theta": 1.0, "hitch1": 0.5, "hitch2": -0.3}
     goal = {"x": -2.0, "y": 1.0, "theta": 0.5}

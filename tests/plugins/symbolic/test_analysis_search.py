@@ -76,6 +76,7 @@ def test_the_papers_robot_has_none(task: str, robot_2r: Robot) -> None:
     assert nearest_singularity((robot_2r, tasks), np.ones(5), starts=20) is None
 
 
+@pytest.mark.thorough
 def test_link_pointing_has_none_even_around_the_target() -> None:
     """There J_bar is infinite where the elbow meets the target: no rank is lost by that."""
     controller = Scenario.load("unicycle_2r_link_pointing").controller()

@@ -127,6 +127,7 @@ def test_what_the_platform_removes_of_ur5(ur5: Robot, fixed_ur5: Robot, rng: np.
         assert abs(lost[0]) > 0.05 * abs(sin(q[0]) * sin(q[1] + q[2] + q[3]))
 
 
+@pytest.mark.thorough
 def test_the_nearest_of_ur5_is_that_of_brute_force(fixed_ur5: Robot, rng: np.random.Generator) -> None:
     shoulder, bounds = Shoulder(fixed_ur5), list(fixed_ur5.q_limits)
     over = 0
