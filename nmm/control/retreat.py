@@ -76,8 +76,10 @@ class Retreat:
     ) -> None:
         self.stalled = positive(stalled, "retreat: stalled")
         self.progress = scalar(progress, "retreat: progress", above=0.0, below=1.0)
-        values = np.ravel(np.asarray(DURATIONS if durations is None else durations)).tolist()
-        self.durations = tuple(positive(duration, "retreat: durations") for duration in values)
+        self.durations = DURATIONS
+        if durations is not None:
+            values = np.ravel(np.asarray(durations)).tolist()
+            self.durations = tuple(positive(duration, "retreat: durations") for duration in values)
         if not self.durations:
             raise InputError(where="retreat: durations", expected="at least one", got=None)
         self.posture = posture

@@ -96,7 +96,7 @@ class SequencedController(Controller):
         self._controllers: dict[tuple[bool, ...], Controller] = {}
         for part in tasks:  # report errors in a task now, not when it begins
             part.function.stages(robot), part.reference.stages(robot)
-            part.gain_matrix(robot), part.approach(robot)
+        self.schedule.tasks_on.feedback()
         first = self.schedule.sequence.next(self.schedule.moment, 0.0, robot.rest)
         self.current = self._controller(first.active, dt)
 

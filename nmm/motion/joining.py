@@ -13,7 +13,6 @@ from nmm.control.controller import Controller
 from nmm.control.sequencing.sequence import Schedule
 from nmm.control.step.quantities import QUANTITIES, saved
 from nmm.control.step.recorded import Recorded, room
-from nmm.model.robots.robot import Robot
 from nmm.motion.clearance import Swept, swept
 from nmm.motion.leg import Leg
 from nmm.motion.residuals import NO_RESIDUALS, Residuals
@@ -26,13 +25,12 @@ def join(
     controller: Controller, schedule: Schedule, legs: Sequence[Leg], dt: float, method: str
 ) -> tuple[Trajectory, Swept | None]:
     """One trajectory of all tasks' rows, NaN where a task is inactive, and its distances."""
-    robot, stack = controller.robot, schedule.tasks
+    robot, stack, tasks = controller.robot, schedule.tasks, schedule.tasks_on
     parts = [leg.recorder.trajectory(dt, method) for leg in legs]
-    rows = stack.rows(robot)
-    first = np.cumsum([0, *(len(task.rows(robot)) for task in stack)])
+    first = np.cumsum([0, *map(len, tasks.each)])
     record = joined_record(controller, schedule, legs)
     count = sum(map(len, parts))
-    sizes = {"N": count, "s": len(rows), "l": len(stack.levels(robot))}
+    sizes = {"N": count, "s": len(tasks.rows), "l": len(tasks.levels)}
     arrays: dict[str, Any] = {}
     for quantity in saved():
         if quantity.shape not in ("Ns", "Nl"):
@@ -40,7 +38,7 @@ def join(
         arrays[quantity.name] = getattr(record, quantity.name, None)
         if arrays[quantity.name] is None:  # computed from what is recorded
             arrays[quantity.name] = quantity.room(sizes)
-            for (_, samples, columns), part in zip(_places(schedule, robot, legs), parts, strict=True):
+            for (_, samples, columns), part in zip(_places(schedule, legs), parts, strict=True):
                 positions = np.array(columns[quantity.shape[1]], dtype=np.int64)
                 if positions.size:
                     arrays[quantity.name][np.ix_(samples, positions)] = part[quantity.name]
@@ -76,8 +74,8 @@ def join(
         more=more,
         kinematics_off=float(np.fmax.reduce([part.kinematics_off for part in parts])),
         unmet=_unmet([part.unmet for part in parts], count),
-        r_names=row_names(robot, schedule),
-        r_units=tuple(row.unit for row in rows),
+        r_names=row_names(schedule),
+        r_units=tuple(row.unit for row in tasks.rows),
         resolver=controller.resolver.name,
         frame=drawn.frame,
         path=path,
@@ -95,15 +93,15 @@ def join(
 
 def room_for(controller: Controller, count: int) -> Recorded:
     """Room for `count` samples of all tasks' rows, active or not."""
-    tasks, robot = controller.given.task, controller.robot
+    tasks = controller.solver.tasks_on if controller.schedule is None else controller.schedule.tasks_on
     n, m, *_, limited = controller.solver.sizes
-    return room(count, n, m, len(tasks.rows(robot)), len(tasks.levels(robot)), limited)
+    return room(count, n, m, len(tasks.rows), len(tasks.levels), limited)
 
 
 def joined_record(controller: Controller, schedule: Schedule, legs: Sequence[Leg]) -> Recorded:
     """The legs' samples as a record of all tasks' rows, NaN (-1) where a task is inactive."""
     whole = room_for(controller, sum(len(leg.recorder) for leg in legs))
-    for leg, samples, columns in _places(schedule, controller.robot, legs):
+    for leg, samples, columns in _places(schedule, legs):
         recorded = leg.recorder.so_far
         for name, values in whole._asdict().items():
             shape = QUANTITIES[name].shape[1:]
@@ -114,14 +112,12 @@ def joined_record(controller: Controller, schedule: Schedule, legs: Sequence[Leg
     return whole
 
 
-def _places(
-    schedule: Schedule, robot: Robot, legs: Sequence[Leg]
-) -> Iterator[tuple[Leg, Integers, dict[str, list[int]]]]:
+def _places(schedule: Schedule, legs: Sequence[Leg]) -> Iterator[tuple[Leg, Integers, dict[str, list[int]]]]:
     """Each leg with the samples of the whole run that are its own, and the columns of its rows (s) and levels
     (l) among those of all tasks."""
     stack, begin = schedule.tasks, 0
     levels = sorted({task.priority for task in stack})
-    first = np.cumsum([0, *(len(task.rows(robot)) for task in stack)])
+    first = np.cumsum([0, *map(len, schedule.tasks_on.each)])
     for leg in legs:
         on = np.flatnonzero(leg.active)
         samples = begin + np.arange(len(leg.recorder))
@@ -137,13 +133,14 @@ def _places(
         )
 
 
-def row_names(robot: Robot, schedule: Schedule) -> tuple[str, ...]:
+def row_names(schedule: Schedule) -> tuple[str, ...]:
     """Names of all rows, prefixed by the task's where two tasks share a row's name."""
-    stack = schedule.tasks
-    names = [row.name for row in stack.rows(robot)]
+    tasks = schedule.tasks_on
+    names = [row.name for row in tasks.rows]
     if len(set(names)) == len(names):
         return tuple(names)
-    return tuple(f"{task.name or i}: {row.name}" for i, task in enumerate(stack) for row in task.rows(robot))
+    pairs = enumerate(zip(tasks.stack, tasks.each, strict=True))
+    return tuple(f"{task.name or i}: {row.name}" for i, (task, rows) in pairs for row in rows)
 
 
 def _unmet(parts: Sequence[Residuals], count: int) -> Residuals:

@@ -87,7 +87,7 @@ class SeenPoints:
                     if points[k] >= 0
                 ]
                 _add(cameras, camera, sight, points, goals)
-            first += len(task.rows(robot))
+            first += len(task.function.rows(robot))
         edges: dict[str, list[Array]] = {}
         for bound in () if limits is None else limits.bounds:
             if isinstance(bound, Limit):

@@ -50,7 +50,7 @@ def shown_frame(tasks: Iterable[Task], robot: Robot) -> ShownFrame:
     rows: dict[int, int] = {}
     row = 0
     for task in tasks:
-        count = len(task.rows(robot))
+        count = len(task.function.rows(robot))
         shown = _shown(task.function, robot, count)
         if shown.positions is not None and frame in (None, shown.positions):
             frame = shown.positions

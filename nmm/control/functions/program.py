@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -172,7 +173,7 @@ class Program:
         self.robot = robot
         self._compiled = kinematics == COMPILED
         self.first_rows: list[int] = []
-        self._lengths = [len(function.rows(robot)) for function in functions]
+        self._functions = functions
         self._stages: list[tuple[Stage, int]] = []
         self._rows = 0
         for function in functions:
@@ -284,6 +285,10 @@ class Program:
             Evaluation(*(part[first : first + length].copy() for part in (value, value_t, value_q)))
             for first, length in zip(self.first_rows, self._lengths, strict=True)
         ]
+
+    @cached_property
+    def _lengths(self) -> list[int]:
+        return [len(function.rows(self.robot)) for function in self._functions]
 
 
 def evaluate(function: Function, t: float, configuration: Configuration) -> Evaluation:

@@ -122,7 +122,9 @@ class LimitsOn:
         bounds = (*held, *(bound for bound in limits.bounds if isinstance(bound, Bound)))
         own = [limit for limit in limits.bounds if isinstance(limit, Limit)]
         self.functions = tuple(bound.function for bound in bounds)
-        bound_rows = [(bound, row) for bound in bounds for row in bound.rows(robot)]
+        each = [bound.rows(robot) for bound in bounds]
+        bound_rows = [(bound, row) for bound, rows in zip(bounds, each, strict=True) for row in rows]
+        self._lengths = tuple(map(len, each))
         self._ends = np.array([row[2:] for _, row in bound_rows]).reshape(-1, 2)
         self.braking = np.array(
             [np.nan if bound.braking is None else bound.braking for bound, _ in bound_rows]
@@ -169,12 +171,10 @@ class LimitsOn:
             or own
         )
 
-    def numbers(self, first_rows: Sequence[int], robot: Robot) -> LimitNumbers:
+    def numbers(self, first_rows: Sequence[int]) -> LimitNumbers:
         """The record that a control step reads; first_rows: the program's first row of each function."""
         rows = [
-            first + i
-            for first, function in zip(first_rows, self.functions, strict=True)
-            for i in range(len(function.rows(robot)))
+            first + i for first, count in zip(first_rows, self._lengths, strict=True) for i in range(count)
         ]
         positions = self.coordinates[np.maximum(self._moved, 0)]
         positions[self._moved < 0] = [-np.inf, np.inf]

@@ -230,14 +230,14 @@ class Schedule:
 
     Attributes
     ----------
-    tasks : all tasks, active or not
+    tasks : all tasks, active or not; tasks_on : with their rows on the robot
     sequence : their conditions
     moment : the decision at the last sample
     events : those since the last `reset`
     """
 
     def __init__(self, tasks: Stack, robot: Robot) -> None:
-        self.tasks = tasks
+        self.tasks, self.tasks_on = tasks, tasks.on(robot)
         self.sequence = Sequence(tasks, robot)
         self.reset()
 

@@ -55,7 +55,7 @@ def _derivatives(solver: StepSolver, q: Array) -> Sequence[Array]:
         if isinstance(term, WeightedFunction):
             configuration = Configuration(robot, q)
             whole.append(evaluate(term.function, 0.0, configuration).value_q @ configuration.S)
-    return J, added_J[: len(solver.added_task.rows(robot))], h, *whole
+    return J, added_J[: len(solver.added_on.rows)], h, *whole
 
 
 def _zero_columns(

@@ -10,7 +10,7 @@ from nmm.base.kernels.record_layout import header_length, views
 from nmm.control.functions.function import Function, row_scales
 from nmm.control.functions.objectives.base import Objective
 from nmm.control.functions.program import BESIDE, COMPILED, PINOCCHIO, Buffers, Program
-from nmm.control.functions.tasks.task import Stack
+from nmm.control.functions.tasks.task import Stack, TasksOn
 from nmm.control.limits.bounds import DistanceDamper
 from nmm.control.limits.collisions import Collisions
 from nmm.control.limits.limits import Limits, LimitsOn
@@ -84,6 +84,7 @@ def checked(arguments: ControllerArguments) -> ControllerArguments:
 class ControllerLayout(NamedTuple):
     """A controller's records in memory, and the objects that they were laid out from.
 
+    tasks, added : the tasks and the added ones, with their rows
     program : the functions, in memory; step : what a step reads and writes besides them, as views
     dimensions, state : of the resolver's problem, and what the resolver remembers
     limits_on : the limits, resolved for the robot
@@ -91,6 +92,8 @@ class ControllerLayout(NamedTuple):
     steered : the steering law, if the equations have room for it
     """
 
+    tasks: TasksOn
+    added: TasksOn
     program: Program
     step: ControlStep
     dimensions: Dimensions
@@ -107,7 +110,8 @@ def lay_out(arguments: ControllerArguments, steered: Steered | None) -> Controll
     limited = limits is not None or collisions is not None
     second = arguments.order == 2
     code, limits_code = (accelerate, write_next_limits) if second else (compiled_step, write_limits)
-    rows, added_rows = task.rows(robot), added_task.rows(robot)
+    tasks, added_tasks = task.on(robot), added_task.on(robot)
+    rows, added_rows = tasks.rows, added_tasks.rows
     weighted = () if objective is None else objective.terms_on(robot)
     functions, added = task_functions(task), task_functions(added_task)
     limits_on = (Limits(False, False) if limits is None else limits).on(robot)
@@ -138,7 +142,7 @@ def lay_out(arguments: ControllerArguments, steered: Steered | None) -> Controll
         inputs=robot.u_names,
         groups=robot.groups,
         row_scales=row_scales(rows, robot),
-        levels=task.levels(robot),
+        levels=tasks.levels,
         added_J=np.vstack([np.zeros((len(added_rows), m)), held]),
         added_rate=np.zeros(len(added_rows) + len(held)),
         added_row_scales=np.append(row_scales(added_rows, robot), np.ones(len(held))),
@@ -148,19 +152,21 @@ def lay_out(arguments: ControllerArguments, steered: Steered | None) -> Controll
         limit_levels=[*(task.place(priority) for priority in limits_on.priorities), *(0 for _ in near.d)],
     )
     arrays = problem.arrays._replace(limiter=enforce_limits.address if limited else 0)
-    numbers = limits_on.numbers(first[after : after + len(limits_on.functions)], robot)
+    numbers = limits_on.numbers(first[after : after + len(limits_on.functions)])
     arrays.stops[m + len(numbers.spin) :] = UPPER + LOWER
     arrays.stops[m + limits_on.first_own : m + len(limits_on.rows)] = 0  # those of speeds and forces
     dimensions = problem.dimensions
     setup, state = resolver.setup(dimensions), resolver.start(dimensions)
     differenced = len(limits_on.rows) + s + len(added_rows), objective_at
+    own = task_rows(tasks, first, limits_on.bounded)
+    theirs = task_rows(added_tasks, first[len(functions) :], limits_on.bounded)
     own_limits = _own_limits(limits_on, program)
     program.lay_out(
         ControlStep(
             near=near,
             clearance=_clearance(collisions, len(limits_on.rows), len(near.d)),
-            task=task_rows(task, robot, first, limits_on.bounded),
-            added=task_rows(added_task, robot, first[len(functions) :], limits_on.bounded),
+            task=own,
+            added=theirs,
             arm=Arm(robot.arm_coordinates, robot.following.table.ravel()),
             terms=np.array(first[objective_at : objective_at + len(objectives)], dtype=np.int64),
             weights=np.array([weight for weight, _ in weighted]),
@@ -179,7 +185,7 @@ def lay_out(arguments: ControllerArguments, steered: Steered | None) -> Controll
             q_dot=np.zeros(robot.n),
             retreat=retreat_numbers(arguments.retreat, robot, rows),
             period=NOT_CALLED,
-            second=_second(arguments, program, first, differenced, limits_on.bounded) if second else _first(),
+            second=_second(arguments, program, own, theirs, differenced) if second else _first(),
             t=np.array(0.0),
             own_limits=program.place_after(ControlStep)
             + header_length(LaidOutLimit) * np.arange(len(own_limits), dtype=np.int64),
@@ -194,7 +200,9 @@ def lay_out(arguments: ControllerArguments, steered: Steered | None) -> Controll
     if second and program.calls_python:
         step.second.h[()] = BESIDE_BY_IN_PYTHON
     state.memory = step.state
-    return ControllerLayout(program, step, dimensions, state, limits_on, weighted, steered)
+    return ControllerLayout(
+        tasks, added_tasks, program, step, dimensions, state, limits_on, weighted, steered
+    )
 
 
 def _own_limits(limits_on: LimitsOn, program: Program) -> list[LaidOutLimit]:
@@ -214,12 +222,11 @@ def _own_limits(limits_on: LimitsOn, program: Program) -> list[LaidOutLimit]:
 def _second(
     arguments: ControllerArguments,
     program: Program,
-    first: list[int],
+    task: TaskRows,
+    added: TaskRows,
     differenced: tuple[int, int],
-    bounded: tuple[str, ...],
 ) -> SecondOrder:
-    robot, (rows, functions) = arguments.robot, differenced
-    n, m = robot.n, robot.n_u
+    n, m, (rows, functions) = arguments.robot.n, arguments.robot.n_u, differenced
     stages, buffers = program.rows_of(functions)
     return SecondOrder(
         servo=np.array(float(arguments.servo)),
@@ -227,12 +234,12 @@ def _second(
         share=np.array(1.0),
         stages=stages,
         buffers=buffers,
-        task=task_rows(arguments.task, robot, first, bounded),
-        added=task_rows(arguments.added_task, robot, first[len(task_functions(arguments.task)) :], bounded),
+        task=task,
+        added=added,
         beside=np.zeros(n),
         y=np.zeros((3, rows)),
         D=np.zeros(rows),
-        lead=np.zeros(sum(arguments.task.levels(robot))),
+        lead=np.zeros(len(task.rows)),
         lower=np.full(m, -np.inf),
         upper=np.full(m, np.inf),
         u_dot=np.zeros(m),

@@ -76,6 +76,7 @@ class StepSolver:
 
     Attributes
     ----------
+    tasks_on, added_on : the tasks and the added ones, with their rows on the robot
     rows : the task's components
     dimensions : what a resolver is set up with
     sizes : of a sample in a record: n, m, s, priority levels, values with limits
@@ -100,9 +101,10 @@ class StepSolver:
         self.robot, self.task, self.added_task = robot, given.task, given.added_task
         self.resolver, self.objective = resolver, given.objective
         self._whole = type(resolver).finish is Resolver.finish
-        self.rows: tuple[Row, ...] = given.task.rows(robot)
         self.scene: Scene | None = None if collisions is None else collisions.on(robot)
         laid = lay_out(given, steered)
+        self.tasks_on, self.added_on = laid.tasks, laid.added
+        self.rows: tuple[Row, ...] = self.tasks_on.rows
         self.program, self.step_memory, self.dimensions = laid.program, laid.step, laid.dimensions
         self.state: State = laid.state
         self.limits_on, self._steerable, self._terms = laid.limits_on, laid.steered, laid.terms
@@ -135,7 +137,7 @@ class StepSolver:
         self.dt: float | None = None
         self.busy = [False]
         limited = 0 if given.limits is None else len(self.limits_on.row_limits)
-        self.sizes = robot.n, robot.n_u, len(self.rows), len(given.task.levels(robot)), limited
+        self.sizes = robot.n, robot.n_u, len(self.rows), len(self.dimensions.levels), limited
         self._solve_calls()
 
     def choose_steering(self, unfelt: Callable[[Steered], bool]) -> None:

@@ -23,7 +23,6 @@ import numpy as np
 from nmm.base.arrays import Array, Flags, Integers
 from nmm.base.kernels.compiled import compiled, kernel, view
 from nmm.base.kernels.signatures import float64, int64, void
-from nmm.control.step.task_rows import gain_rows
 from nmm.motion.recording import Recorder
 from nmm.motion.residuals import differs
 
@@ -85,7 +84,8 @@ class TaskSamples(NamedTuple):
     def of(cls, recorder: Recorder) -> TaskSamples:
         """The samples recorded so far, with the rate of bounded feedback."""
         controller, recorded = recorder.controller, recorder.so_far
-        feedback = Feedback(*gain_rows(controller.task, controller.robot))
+        task = controller.solver.step_memory.task
+        feedback = Feedback(task.gain, task.speed, task.braking, task.group)
         error, rate, residual, J, u = recorded.error, recorded.rate, recorded.residual, recorded.J, recorded.u
         if feedback.has_bounds:
             full = rate

@@ -259,7 +259,7 @@ def _unmet(controller: Controller, recorder: Recorder, samples: TaskSamples, dt:
         constraints = {"limits": controller.limits, "distances": controller.solver.scene}
         names = [name for name, constraint in constraints.items() if constraint is not None]
         more = {"rows": len(controller.rows), "inputs": controller.robot.n_u}
-        if more["rows"] <= more["inputs"] or len(controller.task.levels(controller.robot)) > 1:
+        if more["rows"] <= more["inputs"] or len(controller.solver.dimensions.levels) > 1:
             more = {}
         yield unmet.finding(scale=float(recorder.so_far.scale.min(initial=1.0)), kept=names, **more)
     if recorder.disturbed:

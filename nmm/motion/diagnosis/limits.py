@@ -122,7 +122,7 @@ def not_kept(recorder: Recorder, controller: Controller) -> Iterator[Finding]:
             "end": float(missed[-1]),
             "again": bool(missed[-1] < recorder.reached),
             "largest": float(recorded.added_residual.max()),
-            "unit": _of_rates(row.unit for row in controller.given.added_task.rows(controller.robot)),
+            "unit": _of_rates(row.unit for row in controller.solver.added_on.rows),
         }
         yield Finding("added_task_missed", values, {"t": float(missed[0])})
     unanswered = times[recorded.unanswered > 0]

@@ -292,20 +292,19 @@ class Growing:
     def __init__(self, controller: Controller) -> None:
         self._robot = robot = controller.robot
         self._schedule = controller.schedule
-        tasks = controller.task if self._schedule is None else self._schedule.tasks
-        self._counts = [len(task.rows(robot)) for task in tasks]
-        rows = [row for task in tasks for row in task.rows(robot)]
+        tasks = controller.solver.tasks_on if self._schedule is None else self._schedule.tasks_on
+        self._counts, rows = [*map(len, tasks.each)], tasks.rows
         self._rows = len(rows)
-        self._shown = shown_frame(tasks, robot)
-        self._seen = SeenPoints(tasks, controller.limits, robot)
+        self._shown = shown_frame(tasks.stack, robot)
+        self._seen = SeenPoints(tasks.stack, controller.limits, robot)
         self._path = None if self._shown.frame is None else FramePath(robot, self._shown.frame)
         self.drawn = self._path is not None, self._path is not None and bool(self._shown.rows)
         self.partitions: list[str] = []
         self._numbers: dict[tuple[int, ...], int] = {}
-        names = [row.name for row in rows] if self._schedule is None else row_names(robot, self._schedule)
+        names = [row.name for row in rows] if self._schedule is None else row_names(self._schedule)
         # Of tasks that come and go the levels come and go, too.
         some = controller.limits is not None and self._schedule is None
-        self._levels = len(tasks.levels(robot)) if some else 0
+        self._levels = len(tasks.levels) if some else 0
         axes = Axes(robot, tuple(names), tuple(row.unit for row in rows), self._levels)
         hidden = {"objective"} if controller.given.objective is None else set()
         hidden |= {"drift"}  # known at the end

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.base.arrays import Array, array, counted
+from nmm.base.arrays import Array, Integers, array, counted
 from nmm.base.errors import InputError, expect, expect_kind, expect_known, one_or_several
 from nmm.control.functions.function import Function, Row, Stage
 from nmm.control.functions.references.polynomial import Constant
@@ -82,9 +83,9 @@ class Task:
         """Its name, or those of its rows."""
         return self.name or ", ".join(row.name for row in self.rows(robot))
 
-    def approach(self, robot: Robot) -> tuple[Array, Array]:
-        """Speed and braking for the unit of each row, (s,) each; infinite for none."""
-        units = [row.unit for row in self.rows(robot)]
+    def approach(self, robot: Robot, rows: Sequence[Row] = ()) -> tuple[Array, Array]:
+        """Speed and braking for the unit of each row, (s,) each; infinite for none. `rows`: where known."""
+        units = [row.unit for row in rows or self.rows(robot)]
         for name, values in (("speed", self.speed), ("braking", self.braking)):
             for unit in filter(None, values):
                 expect_known("unit", unit, sorted(set(units)), name)
@@ -105,9 +106,9 @@ class Task:
             raise InputError(what, where=where, expected=expected, got=len(targets))
         return rows
 
-    def gain_matrix(self, robot: Robot) -> Array:
-        """K as an (s, s) matrix; zero in planning mode."""
-        rows = self.rows(robot)
+    def gain_matrix(self, robot: Robot, rows: Sequence[Row] = ()) -> Array:
+        """K as an (s, s) matrix; zero in planning mode. `rows`: where they are known."""
+        rows = rows or self.rows(robot)
         name = f"gain of task {', '.join(row.name for row in rows)}"
         s = len(rows)
         if self.gain is None:
@@ -132,12 +133,12 @@ class Comparison(Function):
         self.task = task
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        return () if self.task.function.comparison is None else self.task.rows(robot)
+        return () if self.task.function.comparison is None else self.task.function.rows(robot)
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
-        kernel, s = self.task.function.comparison, len(self.task.rows(robot))
-        if kernel is None:
+        if (kernel := self.task.function.comparison) is None:
             return ()
+        s = len(self.task.rows(robot))
         for part in (self.task.function, self.task.reference):
             rows = max(stage.rows for stage in part.stages(robot))
             expect(rows == s, type(part).__name__, f"stages of {s} rows, as many as its components", rows)
@@ -174,10 +175,7 @@ class Stack:
 
     def levels(self, robot: Robot) -> tuple[int, ...]:
         """How many rows each level of priority has, the first level first."""
-        counts: dict[int, int] = {}
-        for task in self.tasks:
-            counts[task.priority] = counts.get(task.priority, 0) + len(task.rows(robot))
-        return tuple(counts.values())
+        return self.on(robot).levels
 
     def place(self, priority: int | None) -> int:
         """The number, from 1 on, of the first level that is not above a priority; 0 for None, above all."""
@@ -187,4 +185,40 @@ class Stack:
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         """The rows of all tasks, in order."""
-        return tuple(row for task in self.tasks for row in task.rows(robot))
+        return self.on(robot).rows
+
+    def on(self, robot: Robot) -> TasksOn:
+        """These tasks on one robot, with their rows."""
+        return TasksOn(self, robot, tuple(task.rows(robot) for task in self.tasks))
+
+
+class TasksOn(NamedTuple):
+    """Tasks on one robot, and the rows of `each`: what a controller is laid out from, and its runs read."""
+
+    stack: Stack
+    robot: Robot
+    each: tuple[tuple[Row, ...], ...]
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """The rows of all tasks, in order."""
+        return tuple(row for rows in self.each for row in rows)
+
+    @property
+    def levels(self) -> tuple[int, ...]:
+        """How many rows each level of priority has, the first level first."""
+        counts: dict[int, int] = {}
+        for task, rows in zip(self.stack, self.each, strict=True):
+            counts[task.priority] = counts.get(task.priority, 0) + len(rows)
+        return tuple(counts.values())
+
+    def feedback(self) -> tuple[Array, Array, Array, Integers]:
+        """K (s, s), block by block; speed, braking and group (s,), see `TaskRows`."""
+        K, first = np.zeros((len(self.rows),) * 2), 0
+        bounds = [np.zeros((2, 0))]
+        for task, rows in zip(self.stack, self.each, strict=True):
+            own = slice(first, first := first + len(rows))
+            K[own, own] = task.gain_matrix(self.robot, rows)  # SciPy's block_diag loads its linear algebra
+            bounds.append(np.array(task.approach(self.robot, rows)))
+        units = [(k, row.unit) for k, rows in enumerate(self.each) for row in rows]
+        return K, *np.hstack(bounds), np.array([units.index(unit) for unit in units], dtype=np.int64)
