@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 from paper_cases import CASES, TIP, Case
 
 from nmm.control.controller import Controller
+from nmm.control.functions.function import Function, Row
 from nmm.control.functions.objectives import CallableObjective, Objective
 from nmm.control.functions.program import evaluate
-from nmm.control.functions.references import CallableReference
-from nmm.control.functions.tasks import CallableFunction, Task
+from nmm.control.functions.references import CallableReference, Constant
+from nmm.control.functions.tasks import CallableFunction, Position, Task
+from nmm.control.limits.limited_function import Bound
+from nmm.control.limits.limits import Limits
 from nmm.control.resolvers import CallableResolver, Problem, ProjectedGradient, ReducedGradient
 from nmm.control.step.equations import step
 from nmm.model.robots.robot import Robot
@@ -245,3 +248,24 @@ def test_arrays_that_compiled_code_made_are_taken_as_they_are(robot_2r: Robot) -
     np.testing.assert_array_equal(
         controller(2.0, q), Controller(robot_2r, TIP, ProjectedGradient())(2.0, list(q))
     )
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_each_function_is_asked_once_for_its_rows(
+    order: int, robot_2r: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Function] = []
+    for kind in (Position, Constant):
+        rows = kind.rows
+
+        def counted(
+            self: Function, robot: Robot, rows: Callable[..., tuple[Row, ...]] = rows
+        ) -> tuple[Row, ...]:
+            asked.append(self)
+            return rows(self, robot)
+
+        monkeypatch.setattr(kind, "rows", counted)
+    tasks = [Task(Position("ee", axis), [1.0], priority=i + 1) for i, axis in enumerate("xy")]
+    limits = Limits(bounds=Bound(Position("ee", "x"), -5.0, 5.0))
+    Controller(robot_2r, tasks, ProjectedGradient(), limits=limits, dt=0.01, order=order)
+    assert len(asked) == len({*map(id, asked)}) == 5

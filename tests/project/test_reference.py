@@ -97,6 +97,7 @@ INNER = {
     "nmm.Scenario.__init__",  # made by load and from_dict
     "nmm.SequencedController.moment",
     "nmm.SequencedController.settle",
+    "nmm.Stack.on",
     "nmm.Steering.on",
     "nmm.analysis.About.of",
 }
