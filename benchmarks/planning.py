@@ -4,7 +4,8 @@
 
 to random poses of the platform without obstacles (1000 5 poses_differential poses_car --only rests), past a
 gap that closes for good before the robot is through (20 7 closing_gap --only rests), with so many ways, and
-with a hand's pose held among posts (100 7 hold hold_car --only rests).
+with a hand's pose held among posts (100 7 hold hold_car --only rests). `--prepared` measures the second
+plan of an `nmm.Planner`, and `nmm.replan` from a tenth of it with every obstacle moved by up to 20 mm.
 
 Each plan is checked by what shares no code with the planner: Coal on the exact shapes of the robot at 2,000
 times along it, differences of its coordinates against S(q) u, and the limits. `free` is the least distance
@@ -362,6 +363,7 @@ def main() -> None:
     parser.add_argument("seed", type=int, nargs="?", default=0)
     parser.add_argument("kinds", nargs="*", choices=[[], *KINDS], default=[])
     parser.add_argument("--only", choices=["rests", "smooth"])
+    parser.add_argument("--prepared", action="store_true")
     parser.add_argument("--ways", type=int, default=search.WAYS)
     given = parser.parse_args()
     search.WAYS = given.ways
@@ -372,23 +374,45 @@ def main() -> None:
     for kind in given.kinds or SIX:
         for smooth in (False, True):
             if given.only in (None, "smooth" if smooth else "rests"):
-                measure(kind, given.instances, given.seed, smooth)
+                measure(kind, given.instances, given.seed, smooth, given.prepared)
 
 
-def measure(kind: str, instances: int, seed: int, smooth: bool) -> None:
+def replanned(scene: Scene, plan: nmm.Plan, rng: np.random.Generator) -> float:
+    """The processor time of `nmm.replan` among obstacles that were moved, s; nan where none is found."""
+    moved = [
+        nmm.Obstacle(one.shape, one.placement(0.0)[:3, 3] + rng.uniform(-0.02, 0.02, 3), name=one.name)
+        for one in scene.obstacles
+    ]
+    (q,), _ = plan(0.1 * plan.duration)
+    begin = time.process_time()
+    try:
+        nmm.replan(plan, q, moved)
+    except nmm.NmmError:
+        return np.nan
+    return time.process_time() - begin
+
+
+def measure(kind: str, instances: int, seed: int, smooth: bool, prepared: bool) -> None:
     """Print a line: processor time and motion of the plans of a kind, with rests or smooth."""
     times, durations, found, drifts, smoothed, arrived = [], [], [], [], 0, 0
+    again = []
     for k in range(instances):
         scene = KINDS[kind](np.random.default_rng([seed, k]))
-        given = scene.robot, scene.start, scene.goal, scene.obstacles, nmm.Collisions(scene.distance), LIMITS
+        given = scene.obstacles, nmm.Collisions(scene.distance), LIMITS
         begin = time.process_time()
         try:
-            plan = nmm.plan(*given, seed=k, smooth=smooth, hold=scene.hold)
+            planner = nmm.Planner(scene.robot, *given, smooth=smooth, hold=scene.hold)
+            if prepared:
+                planner.plan(scene.start, scene.goal, seed=k + 1)
+                begin = time.process_time()
+            plan = planner.plan(scene.start, scene.goal, seed=k)
         except nmm.NmmError as error:
             print(f"  {kind} {k}: {error} ({time.process_time() - begin:.2f} s)")
             continue
         times.append(time.process_time() - begin)
         durations.append(plan.duration)
+        if prepared and scene.hold is None:
+            again.append(replanned(scene, plan, np.random.default_rng(k)))
         found.append(checked(scene, plan, 2000 if scene.obstacles else 100))
         arrived += at_goal(scene, plan)
         smoothed += plan.smooth
@@ -402,6 +426,8 @@ def measure(kind: str, instances: int, seed: int, smooth: bool) -> None:
             f"{least.motion:14.1e} {least.limits:7.1e}",
             flush=True,
         )
+    if again:
+        print(f"  replanned in {1e3 * np.nanmedian(again):.1f} ms, {1e3 * np.nanmax(again):.0f} at most")
     if drifts:
         metres, radians = np.max(drifts, axis=0)
         print(f"  held within {1e3 * metres:.3f} mm and {radians:.1e} rad")

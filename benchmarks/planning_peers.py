@@ -23,7 +23,7 @@ import numpy as np
 from planning import DISTANCE, KINDS, LIMITS, SIX, Scene, checked
 
 import nmm
-from nmm.plugins.planning.plan import Asked
+from nmm.plugins.planning.prepared import Asked, Prepared
 from nmm.plugins.planning.search import PlanSearch
 
 #: What OMPL may take, s.
@@ -59,7 +59,7 @@ def of_ompl(scene: Scene, seed: int) -> nmm.Plan:
 
     robot, start = scene.robot, scene.robot.q(scene.start)
     asked = Asked(nmm.Collisions(DISTANCE, obstacles=scene.obstacles), LIMITS, nmm.Goal())
-    search = PlanSearch(robot, start, [scene.goal], asked, seed)
+    search = PlanSearch(Prepared(robot, asked), start, [scene.goal], seed)
     search.begin(SECONDS, None)
     goals, n_p, ways = search.ends(scene.goal, start), robot.platform.n_p, search.trees.ways
 

@@ -122,7 +122,8 @@ from .plugins.live import rendering as rendering
 from .plugins.planning.horizon import Horizon as Horizon
 from .plugins.planning.parking import Parking as Parking
 from .plugins.planning.plan import Plan as Plan
-from .plugins.planning.planned import plan as plan
+from .plugins.planning.planner import Planner as Planner
+from .plugins.planning.planner import plan as plan
 from .plugins.planning.replan import replan as replan
 from .plugins.robot import ros as ros
 from .plugins.robot.loop_state import LoopState as LoopState

@@ -7,7 +7,7 @@ import nmm
 from nmm.base.kernels.kinematics import axes, place_joints
 from nmm.base.kernels.record_layout import views
 from nmm.model.collisions.pairs import random_configurations
-from nmm.model.collisions.separation import CLOSE
+from nmm.model.collisions.separation import CLOSE, ROUGH
 from nmm.model.robots.zero_order_hold import HeldInputs
 from nmm.plugins.planning.collisions.legs_check import (
     MovedShapes,
@@ -51,16 +51,22 @@ def test_bounds_are_below_distances_and_near_them(scene):
     for q in random_configurations(scene.robot, 60, seed=1):
         place_joints(shapes.joints, q, joints)
         exact = scene.queries.distances(0.0, q, pairs)
-        bound = np.array([pair_bound(shapes, joints, k, np.inf) for k in pairs])
+        bound = np.array([pair_bound(shapes, joints, k, np.inf, np.nan) for k in pairs])
         apart = exact > 0.0
         assert np.all(bound[apart] <= exact[apart] + 1e-6)
         # The closeness is of the cores, without the radii about them.
         assert np.all(bound[apart] >= exact[apart] - CLOSE * (exact[apart] + 0.5) - 1e-3)
         assert np.all(bound[exact < -1e-4] <= 0.0)
         for enough in (0.05, 0.5):
-            rough = np.array([pair_bound(shapes, joints, k, enough) for k in pairs])
+            rough = np.array([pair_bound(shapes, joints, k, enough, np.nan) for k in pairs])
             assert np.all(rough[apart] <= exact[apart] + 1e-6)
             assert np.all(rough[exact > enough + CLOSE * (exact + 0.5) + 1e-3] >= enough)
+        for least in (0.05, 0.5):
+            rough = np.array([pair_bound(shapes, joints, k, np.inf, least) for k in pairs])
+            assert np.all(rough[apart] <= exact[apart] + 1e-6)
+            above = exact > least + CLOSE * (exact + 0.5) + 1e-3
+            assert np.all(rough[above] - least >= (1.0 - ROUGH) * (bound[above] - least) - 1e-3)
+            assert np.all(rough[exact < least - 1e-6] <= least)
 
 
 def test_legs_that_are_free_keep_their_distances_everywhere(scene):
@@ -99,7 +105,7 @@ def test_pairs_come_nearer_no_faster_than_their_speed_and_its_change_say(scene):
         leg[3:] = robot.following.placed(leg[3:]) - robot.following.placed(np.zeros(robot.n))
         place_joints(shapes.joints, q, joints)
         axes(shapes.joints, joints, twists)
-        apart = np.array([pair_bound(shapes, joints, k, np.inf) for k in pairs])
+        apart = np.array([pair_bound(shapes, joints, k, np.inf, np.nan) for k in pairs])
         speed = np.array([speed_towards(shapes, q, leg, joints, twists, k) for k in pairs])
         change = np.array([bend(shapes, k, leg) for k in pairs])
         for share in (0.01, 0.1, 0.4, 1.0):

@@ -11,10 +11,11 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from nmm.base.arrays import Array
+from nmm.base.arrays import Array, Integers
 from nmm.base.errors import InputError, expect_known
 from nmm.base.text_format import is_pattern, matching
 from nmm.model.collisions.shapes import hull
+from nmm.model.robots.joint_table import placement_rows
 from nmm.model.robots.robot import Robot
 
 #: Two shapes by their numbers.
@@ -79,6 +80,11 @@ def _capsule(points: Array) -> tuple[Any, pin.SE3]:
 
 
 def random_configurations(robot: Robot, count: int = SAMPLES, seed: int = 0) -> Array:
+    return _drawn(robot, count, seed).copy()
+
+
+@lru_cache(maxsize=8)
+def _drawn(robot: Robot, count: int, seed: int) -> Array:
     rng = np.random.default_rng(seed)
     limits = robot.q_limits
     ends = np.where(robot.limited & (np.abs(limits) < ENDLESS), limits, [-RANGE, RANGE])
@@ -90,56 +96,93 @@ def touching(
 ) -> dict[Pair, float]:
     """The share of random configurations in which each pair is nearer than `distance`, m."""
     measure = measured_pairs(robot, shapes, pairs)
-    near = sum((measure(q) < distance for q in random_configurations(robot)), start=np.zeros(len(pairs)))
+    drawn = random_configurations(robot)
+    near = sum((measure(q, distance) < distance for q in drawn), start=np.zeros(len(pairs)))
     return dict(zip(pairs, (near / SAMPLES).tolist(), strict=True))
 
 
 @lru_cache(maxsize=8)
-def own_shapes(robot: Robot, meshes: str, distance: float) -> tuple[pin.GeometryModel, frozenset[Pair]]:
-    """`query_shapes`, which are not to be changed, and of the model's pairs those nearer than `distance`, m,
-    in every random configuration."""
+def own_shapes(
+    robot: Robot, meshes: str, distance: float
+) -> tuple[pin.GeometryModel, Array, frozenset[Pair]]:
+    """`query_shapes`, which are not to be changed, the boxes around them, and of the model's pairs those
+    nearer than `distance`, m, in every random configuration."""
     shapes = query_shapes(robot, meshes)
-    pairs = pairs_of(robot.collision_model)
-    return shapes, frozenset(always_near(robot, shapes, pairs, distance))
+    pairs, boxes = pairs_of(robot.collision_model), boxes_around(shapes.geometryObjects)
+    return shapes, boxes, frozenset(always_near(robot, shapes, boxes, pairs, distance))
 
 
 def always_near(
-    robot: Robot, shapes: pin.GeometryModel, pairs: Sequence[Pair], distance: float
+    robot: Robot, shapes: pin.GeometryModel, boxes: Array, pairs: Sequence[Pair], distance: float
 ) -> list[Pair]:
-    """The pairs nearer than `distance`, m, in every random configuration."""
+    """The pairs of shapes, which have these boxes, nearer than `distance`, m, in every random
+    configuration."""
     left = list(pairs)
-    measure = measured_pairs(robot, shapes, left)
+    if not left:
+        return left
+    measure = measured_pairs(robot, shapes, left, boxes)
     for q in random_configurations(robot):
+        near = measure(q, distance) < distance
+        left[:] = [pair for pair, is_near in zip(left, near, strict=True) if is_near]
         if not left:
             break
-        near = measure(q) < distance
-        left[:] = [pair for pair, is_near in zip(left, near, strict=True) if is_near]
     return left
 
 
 def measured_pairs(
-    robot: Robot, shapes: pin.GeometryModel, pairs: Sequence[Pair]
-) -> Callable[[Array], Array]:
-    """The function q (n,) -> each pair's distance (pairs,), m; below 0 inside each other."""
+    robot: Robot, shapes: pin.GeometryModel, pairs: Sequence[Pair], known_boxes: Array | None = None
+) -> Callable[[Array, float], Array]:
+    """The function q (n,), enough -> each pair's distance (pairs,), m; below 0 inside each other. Of pairs
+    whose boxes are farther apart than `enough`, m, a lower bound."""
     model, data, geometry_data = robot.model, robot.model.createData(), pin.GeometryData(shapes)
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     objects = shapes.geometryObjects
+    boxes = boxes_around(objects) if known_boxes is None else known_boxes
+    geometries = [shape.geometry for shape in objects]
 
-    def measure(q: Array) -> Array:
+    def measure(q: Array, enough: float) -> Array:
         pin.updateGeometryPlacements(model, data, shapes, geometry_data, q)
-        distances = np.zeros(len(pairs))
-        for k, (i, j) in enumerate(pairs):
+        transforms: dict[int, Any] = {}
+        numbers = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        distances = _box_bounds(placement_rows(geometry_data.oMg), boxes, numbers)
+        for k in np.flatnonzero(distances < enough):
+            pair = numbers[k].tolist()
+            for i in pair:
+                if i not in transforms:
+                    placement = geometry_data.oMg[i]
+                    transforms[i] = coal.Transform3s(placement.rotation, placement.translation)
+            (first, second), (one, other) = (geometries[i] for i in pair), (transforms[i] for i in pair)
             result.clear()
-            first, second = (
-                coal.Transform3s(geometry_data.oMg[x].rotation, geometry_data.oMg[x].translation)
-                for x in (i, j)
-            )
-            distances[k] = coal.distance(
-                objects[i].geometry, first, objects[j].geometry, second, request, result
-            )
+            distances[k] = coal.distance(first, one, second, other, request, result)
         return distances
 
     return measure
+
+
+def _box_bounds(places: Array, boxes: Array, pairs: Integers) -> Array:
+    """How far the ball around the first of each pair is from the box around the second, (P,), m, where shapes
+    are at places (G, 12); -infinity of half-spaces."""
+    turns, centres = places[:, :9].reshape(-1, 3, 3), places[:, 9:]  # a column of the rotation in a row
+    i, j = pairs.T
+    middles = centres + np.einsum("gak,ga->gk", turns, boxes[:, :3])
+    off = np.einsum("pak,pk->pa", turns[j], middles[i] - centres[j]) - boxes[j, :3]
+    beyond = np.maximum(np.abs(off) - boxes[j, 3:6], 0.0)
+    bounds = np.sqrt(np.einsum("pa,pa->p", beyond, beyond)) - boxes[i, 6]
+    return np.where(np.isinf(boxes[j, 6]), -np.inf, bounds)
+
+
+def boxes_around(objects: Any) -> Array:
+    """The boxes around shapes, (G, 7)."""
+    return np.array([box_around(shape.geometry) for shape in objects]).reshape(-1, 7)
+
+
+def box_around(geometry: Any) -> Array:
+    """Centre, half extents and radius of the box around a shape; a half-space's normal, offset and zeros."""
+    if isinstance(geometry, coal.Halfspace):
+        return np.array([*geometry.n, geometry.d, 0.0, 0.0, np.inf])
+    geometry.computeLocalAABB()
+    low, high = geometry.aabb_local.min_, geometry.aabb_local.max_
+    return np.array([*(low + high) / 2.0, *(high - low) / 2.0, geometry.aabb_radius])
 
 
 def named_pairs(requested: Sequence[tuple[str, str]], names: Sequence[Sequence[str]], what: str) -> set[Pair]:

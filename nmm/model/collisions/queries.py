@@ -17,7 +17,7 @@ from nmm.base.kernels.record_layout import BLOCKS, Blocks, Memory, views
 from nmm.base.kernels.signatures import float64, int64, void
 from nmm.model.collisions.broad_phase import PairArrays, find_near
 from nmm.model.collisions.obstacle import Obstacle
-from nmm.model.collisions.pairs import pairs_of
+from nmm.model.collisions.pairs import box_around, pairs_of
 from nmm.model.collisions.rows import DistanceRows, write_row, write_rows
 from nmm.model.robots.joint_table import placement_rows
 from nmm.model.robots.robot import Robot
@@ -210,8 +210,8 @@ def _scene(
     for i, shape in enumerate(objects):
         for joint in robot.model.supports[shape.parentJoint].tolist()[1:]:
             supports[i, robot.model.joints[joint].idx_v] = 1.0
-        boxes[i] = _box(shape.geometry)
-        points, rounding[i] = _corners(shape.geometry)
+        boxes[i] = box_around(shape.geometry)
+        points, rounding[i] = corners_of(shape.geometry)
         corners.append(points)
     pairs = np.array(pairs_of(shapes), dtype=np.int64).reshape(-1, 2)
     P = len(pairs)
@@ -237,16 +237,7 @@ def _scene(
     )
 
 
-def _box(geometry: Any) -> Array:
-    """Centre, half extents and radius of the box around a shape; a half-space's normal, offset and zeros."""
-    if isinstance(geometry, coal.Halfspace):
-        return np.array([*geometry.n, geometry.d, 0.0, 0.0, np.inf])
-    geometry.computeLocalAABB()
-    low, high = geometry.aabb_local.min_, geometry.aabb_local.max_
-    return np.array([*(low + high) / 2.0, *(high - low) / 2.0, geometry.aabb_radius])
-
-
-def _corners(geometry: Any) -> tuple[Array, float]:
+def corners_of(geometry: Any) -> tuple[Array, float]:
     """The corners of a shape in its axes, (V, 3), and the radius about them; a cylinder's are on its rims."""
     if isinstance(geometry, coal.Box):
         grid = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,15 @@ import pinocchio as pin
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError, RobotError, few
 from nmm.model.collisions.obstacle import Obstacle
-from nmm.model.collisions.pairs import always_near, link_names, named_pairs, own_shapes, pairs_of, touching
+from nmm.model.collisions.pairs import (
+    always_near,
+    boxes_around,
+    link_names,
+    named_pairs,
+    own_shapes,
+    pairs_of,
+    touching,
+)
 from nmm.model.collisions.queries import Queries
 from nmm.model.collisions.shapes import HalfSpace
 from nmm.model.robots.loading.srdf import read_srdf
@@ -34,18 +43,27 @@ class Scene:
     ----------
     robot : the robot
     obstacles : in the order of their shapes, half-spaces last
-    queries : which measures distances
+    shapes, boxes (G, 7) : the robot's, then theirs, with the pairs, and the boxes around them
+    meshes : what the robot's are of, see `query_shapes`
     names (P,) : what the two of a pair are called: links, obstacles
-    distance : to keep, m
+    distance : to keep, m; band : within which pairs have rows, m
     notes : what was left out and why, a sentence each
     """
 
     robot: Robot
     obstacles: tuple[Obstacle, ...]
-    queries: Queries
+    shapes: pin.GeometryModel
+    boxes: Array
+    meshes: str
     names: tuple[tuple[str, str], ...]
     distance: float
+    band: float
     notes: tuple[str, ...]
+
+    @cached_property
+    def queries(self) -> Queries:
+        """What measures distances."""
+        return Queries(self.robot, self.shapes, self.obstacles, self.band, self.distance + FACES)
 
     def words(self, pair: int) -> str:
         """The two of a pair, for messages; "nothing" for -1."""
@@ -90,7 +108,7 @@ def set_up(
     if not len(robot.collision_model.geometryObjects):
         what = "it has no collision shapes; <collision> in its file, a box or cylinder a link, makes some"
         raise RobotError(what, where=robot.name)
-    own_ones, own_near = own_shapes(robot, meshes, distance)
+    own_ones, own_boxes, own_near = own_shapes(robot, meshes, distance)
     shapes = own_ones.copy()
     count = len(shapes.geometryObjects)
     links = link_names(robot, shapes)
@@ -106,6 +124,7 @@ def set_up(
             pin.GeometryObject(obstacle.name, 0, 0, obstacle.at(0.0), obstacle.shape.geometry())
         )
         known.append((obstacle.name,))
+    boxes = np.vstack([own_boxes, boxes_around(shapes.geometryObjects.tolist()[count:])])
     wanted = pairs_of(robot.collision_model) if own else []
     wanted += [(i, j) for j in range(count, count + len(sorted_obstacles)) for i in range(count)]
     notes: list[str] = []
@@ -128,7 +147,7 @@ def set_up(
         left_out |= matches
     wanted = [pair for pair in wanted if pair not in left_out]
     always = [pair for pair in wanted if pair in own_near]
-    always += always_near(robot, shapes, [pair for pair in wanted if pair[1] >= count], distance)
+    always += always_near(robot, shapes, boxes, [pair for pair in wanted if pair[1] >= count], distance)
     if always:
         near = list(dict.fromkeys(name(pair) for pair in always))
         notes.append(
@@ -138,7 +157,7 @@ def set_up(
     for j, obstacle in enumerate(sorted_obstacles, count):
         pairs = [pair for pair in wanted if pair[1] == j]
         touches = bool(pairs) and {*pairs} <= {*always}
-        if touches and len(always_near(robot, shapes, pairs, -DEEP)) == len(pairs):
+        if touches and len(always_near(robot, shapes, boxes, pairs, -DEEP)) == len(pairs):
             what = f"contains {robot.name} in every configuration tried"
             raise InputError(what, where=f"obstacle {obstacle.name}")
     remaining = [pair for pair in wanted if pair not in {*always}]
@@ -147,6 +166,5 @@ def set_up(
     shapes.removeAllCollisionPairs()
     for pair in remaining:
         shapes.addCollisionPair(pin.CollisionPair(*pair))
-    queries = Queries(robot, shapes, sorted_obstacles, band, distance + FACES)
     names = tuple((known[i][-1], known[j][-1]) for i, j in remaining)
-    return Scene(robot, sorted_obstacles, queries, names, distance, tuple(notes))
+    return Scene(robot, sorted_obstacles, shapes, boxes, meshes, names, distance, band, tuple(notes))

@@ -13,8 +13,8 @@ from nmm.base.kernels.compiled import compiled, scratch
 from nmm.base.kernels.record_layout import IntegerCell, IntegerMatrix, IntegerVector, Matrix, Vector
 
 #: Rounds of the algorithm; it ends before where the bound is within `CLOSE` of the distance, as a share of
-#: it.
-ROUNDS, CLOSE = 24, 0.01
+#: it, or within `ROUGH` of what the bound is above the distance to keep, as a share of that.
+ROUNDS, CLOSE, ROUGH = 24, 0.01, 0.2
 
 
 class ConvexShapes(NamedTuple):
@@ -23,24 +23,33 @@ class ConvexShapes(NamedTuple):
     boxes (G, 7) : centre, half extents and radius of a shape's box; a half-space's normal and offset
     planes () : half-spaces are the shapes from this one on, and second in their pairs
     first_corner (G + 1,), corners (..., 3) : corners in a shape's axes
+    first_neighbour (C + 1,), neighbours (...) : corners at the other ends of a corner's edges; none of shapes
+        whose corners are few
     rounding (G,) : radius about them; disc (G,) : radius of a cylinder, in place of corners, 0 of others
     pairs (P, 2); between (P, 3) : a direction from the second to the first that separated them last, world
-    axes
+        axes
+    last (4 P,) : the corners of a pair's two shapes found last: in directions that separate them, then others
     """
 
     boxes: Matrix
     planes: IntegerCell
     first_corner: IntegerVector
     corners: Matrix
+    first_neighbour: IntegerVector
+    neighbours: IntegerVector
     rounding: Vector
     disc: Vector
     pairs: IntegerMatrix
     between: Matrix
+    last: IntegerVector
 
 
 @compiled
-def extreme(shapes: ConvexShapes, places: Array, shape: int, d: Array, sign: float, out: Array) -> None:
-    """out (3,): the point of a shape, without its rounding, farthest along sign d, world axes."""
+def extreme(
+    shapes: ConvexShapes, places: Array, shape: int, d: Array, sign: float, slot: int, out: Array
+) -> None:
+    """out (3,): the point of a shape, without its rounding, farthest along sign d, world axes. Where
+    edges are known it is climbed to along them from the corner in this slot of `last`."""
     x = y = z = 0.0
     for i in range(3):
         x += sign * places[shape, i] * d[i]
@@ -52,11 +61,25 @@ def extreme(shapes: ConvexShapes, places: Array, shape: int, d: Array, sign: flo
         x, y = share * x, share * y
         z = math.copysign(shapes.boxes[shape, 5], z)
     else:
-        best, most = shapes.first_corner[shape], -math.inf
-        for c in range(shapes.first_corner[shape], shapes.first_corner[shape + 1]):
-            along = x * shapes.corners[c, 0] + y * shapes.corners[c, 1] + z * shapes.corners[c, 2]
-            if along > most:
-                best, most = c, along
+        first, after = shapes.first_corner[shape], shapes.first_corner[shape + 1]
+        best, most = first, -math.inf
+        if shapes.first_neighbour[first] < shapes.first_neighbour[after]:
+            best = first + shapes.last[slot]
+            most = x * shapes.corners[best, 0] + y * shapes.corners[best, 1] + z * shapes.corners[best, 2]
+            at = -1
+            while at != best:
+                at = best
+                for e in range(shapes.first_neighbour[at], shapes.first_neighbour[at + 1]):
+                    c = shapes.neighbours[e]
+                    along = x * shapes.corners[c, 0] + y * shapes.corners[c, 1] + z * shapes.corners[c, 2]
+                    if along > most:
+                        best, most = c, along
+            shapes.last[slot] = best - first
+        else:
+            for c in range(first, after):
+                along = x * shapes.corners[c, 0] + y * shapes.corners[c, 1] + z * shapes.corners[c, 2]
+                if along > most:
+                    best, most = c, along
         x, y, z = shapes.corners[best, 0], shapes.corners[best, 1], shapes.corners[best, 2]
     for i in range(3):
         out[i] = (
@@ -153,14 +176,15 @@ def nearest_point(simplex: Array, count: int, v: Array) -> int:
 
 
 @compiled
-def above_half_space(shapes: ConvexShapes, places: Array, plane: int, shape: int) -> float:
-    """Height of a shape above a half-space."""
+def above_half_space(shapes: ConvexShapes, places: Array, pair: int) -> float:
+    """Height of the first of a pair above the second, a half-space."""
+    shape, plane = shapes.pairs[pair, 0], shapes.pairs[pair, 1]
     n, lowest = scratch(3), scratch(3)
     for k in range(3):
         n[k] = 0.0
         for i in range(3):
             n[k] += places[plane, 3 * i + k] * shapes.boxes[plane, i]
-    extreme(shapes, places, shape, n, -1.0, lowest)
+    extreme(shapes, places, shape, n, -1.0, 2 * pair, lowest)
     height = -shapes.boxes[plane, 3] - shapes.rounding[shape]
     for k in range(3):
         height += n[k] * (lowest[k] - places[plane, 9 + k])
@@ -168,12 +192,13 @@ def above_half_space(shapes: ConvexShapes, places: Array, plane: int, shape: int
 
 
 @compiled
-def separation(shapes: ConvexShapes, places: Array, pair: int, enough: float) -> float:
+def separation(shapes: ConvexShapes, places: Array, pair: int, enough: float, least: float) -> float:
     """A lower bound of a pair's distance, within `CLOSE` of it where it is below `enough`; not above 0 where
-    the two overlap. places (G, 12): R column by column, then p."""
+    the two overlap. It is within `ROUGH` alone of the distance where that is above `least`, and below `least`
+    where that is; nan for neither. places (G, 12): R column by column, then p."""
     i, j = shapes.pairs[pair, 0], shapes.pairs[pair, 1]
     if j >= shapes.planes[()]:
-        return above_half_space(shapes, places, j, i)
+        return above_half_space(shapes, places, pair)
     radii = shapes.rounding[i] + shapes.rounding[j]
     simplex, v, a, b = scratch((4, 3)), scratch(3), scratch(3), scratch(3)
     square = 0.0
@@ -184,8 +209,8 @@ def separation(shapes: ConvexShapes, places: Array, pair: int, enough: float) ->
     count = 0
     for _ in range(ROUNDS):
         length = math.sqrt(square)
-        extreme(shapes, places, i, v, -1.0, a)
-        extreme(shapes, places, j, v, 1.0, b)
+        extreme(shapes, places, i, v, -1.0, 2 * pair, a)
+        extreme(shapes, places, j, v, 1.0, 2 * pair + 1, b)
         along = 0.0
         for k in range(3):
             simplex[count, k] = a[k] - b[k]
@@ -196,8 +221,12 @@ def separation(shapes: ConvexShapes, places: Array, pair: int, enough: float) ->
                 shapes.between[pair, k] = v[k] / length
         if bound - radii >= enough:
             break
-        if count > 0 and length - bound <= CLOSE * max(length - radii, 1e-3):
-            break
+        if count > 0:
+            gap = length - bound
+            if gap <= CLOSE * max(length - radii, 1e-3) or gap <= ROUGH * (bound - radii - least):
+                break
+            if length - radii <= least:
+                break
         count = nearest_point(simplex, count + 1, v)
         square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
         if count == 4 or square < 1e-16:

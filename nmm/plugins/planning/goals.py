@@ -21,7 +21,9 @@ from nmm.control.functions.program import BESIDE, COMPILED, LaidOut, Program, ru
 from nmm.control.functions.tasks.linear_coordinates import Posture
 from nmm.control.functions.tasks.task import Comparison, Task
 from nmm.control.goal import ANOTHER, Goal, norms, unit_codes
+from nmm.model.robots.mimic_joints import SLACK
 from nmm.model.robots.robot import Robot
+from nmm.plugins.planning.collisions.legs_check import MovedShapes, too_near
 from nmm.plugins.planning.collisions.motion_check import MotionCheck
 
 #: A configuration, coordinates by name, a task with a target that stands, or several of these.
@@ -53,6 +55,9 @@ class GoalPostures:
 
     def __init__(self, robot: Robot, low: Array, high: Array, check: MotionCheck, tolerance: Goal) -> None:
         self.robot, self.low, self.high, self.check, self.tolerance = robot, low, high, check, tolerance
+        ends = np.ascontiguousarray(robot.q_limits.T) + np.array([[-SLACK], [SLACK]])
+        ends[:, robot.following.columns] = [[-np.inf], [np.inf]]  # their leaders' limits are theirs, too
+        self._ends = ends
         self.tried = 0
         self.in_the_way: Counter[str] = Counter()
 
@@ -62,12 +67,12 @@ class GoalPostures:
         tries = iter(self._reaching(wanted, start, rng))
         for q in tries:
             self.tried += 1
-            if q is None or self.robot.outside(q):
+            if q is None or np.any(q < self._ends[0]) or np.any(q > self._ends[1]):
                 continue
             pair = self.check.too_near(q)
             if pair >= 0 and self.check.scene is not None:
                 self.in_the_way[self.check.scene.words(pair)] += 1
-            elif not any(np.abs(self.robot.short_way(q - other)).max() < 1e-3 for other in configurations):
+            elif not configurations or self._off(q, configurations) >= 1e-3:
                 configurations.append(q)
             if len(configurations) == count:
                 break
@@ -76,13 +81,33 @@ class GoalPostures:
             configurations, key=lambda q: float(np.abs(self.robot.short_way(q - start)[first:]).sum())
         )
 
+    def _tried(self, solve: TargetSolver, starts: Array) -> Iterator[Array | None]:
+        """What is reached from starts (K, n), those that are free where no Python function is in the way."""
+        if solve.calls_python:
+            yield from map(solve, starts)
+            return
+        pairs, k = np.zeros(len(starts), dtype=np.int64), 0
+        while k < len(starts):
+            arguments = *self.check.blocks, *solve.blocks, starts, k, self._ends, pairs
+            free = solve.try_starts(*arguments)
+            self.tried += free - k
+            near, counts = np.unique(pairs[k:free], return_counts=True)
+            for pair, count in zip(near.tolist(), counts.tolist(), strict=True):
+                if pair >= 0 and self.check.scene is not None:
+                    self.in_the_way[self.check.scene.words(pair)] += count
+            if free < len(starts):
+                yield starts[free]
+            k = free + 1
+
+    def _off(self, q: Array, others: Sequence[Array]) -> float:
+        """How far q (n,) is from the nearest of others, in the coordinate that differs most, m or rad."""
+        return float(np.abs(self.robot.short_way(q - np.array(others))).max(axis=1).min())
+
     def _reaching(self, wanted: object, start: Array, rng: np.random.Generator) -> Iterator[Array | None]:
         robot = self.robot
         if isinstance(wanted, Task):
-            solve = TargetSolver(robot, wanted, self.tolerance)
-            yield solve(start)
-            for _ in range(ATTEMPTS):
-                yield solve(rng.uniform(self.low, self.high))
+            starts = np.vstack([start, rng.uniform(self.low, self.high, (ATTEMPTS, robot.n))])
+            yield from self._tried(TargetSolver(robot, wanted, self.tolerance), starts)
         elif isinstance(wanted, Mapping):
             named = robot.q(wanted)
             own = {robot.coordinate(name) for name in wanted if name in robot.q_names}
@@ -184,7 +209,53 @@ def newton_step(t: float, q: Array, moves: int, integers: Integers, floats: Arra
     return 0
 
 
-_STEPPED = int64(float64, float64[::1], int64, *BLOCKS.types)
+@compiled
+def reach(t: float, q: Array, steps: int, begins: int, integers: Integers, floats: Array) -> int:
+    """`newton_step` so many times, or until it is reached (1); of no steps e and ∂e/∂q at q. begins: 1 where
+    q is to be brought within limits first."""
+    own = views(Newton, integers, floats, BESIDE)
+    if steps == 0:
+        return newton_step(t, q, 0, integers, floats)
+    if begins == 1:
+        for j in range(q.shape[0]):
+            q[j] = min(max(q[j], own.limits[0, j]), own.limits[1, j])
+            own.held[j] = 1.0
+        place_mimic_joints(q, own.mimic_joints)
+    for _ in range(steps):
+        if newton_step(t, q, 1, integers, floats) == 1:
+            return 1
+    return 0
+
+
+@compiled
+def try_starts(
+    integers: Integers,
+    floats: Array,
+    own_integers: Integers,
+    own_floats: Array,
+    starts: Array,
+    first: int,
+    ends: Array,
+    pairs: Integers,
+) -> int:
+    """Reach a task from starts (K, n), from `first` on, until one is within ends (2, n) and free: its number
+    or K. They are moved; pairs (K,): the one that is too near there, or -1 where it is not reached."""
+    scene = views(MovedShapes, integers, floats, 0)
+    for k in range(first, starts.shape[0]):
+        q, inside, pairs[k] = starts[k], reach(0.0, starts[k], STEPS, 1, own_integers, own_floats) == 1, -1
+        for i in range(q.shape[0]):
+            inside = inside and ends[0, i] <= q[i] <= ends[1, i]
+        if inside:
+            pairs[k] = too_near(scene, q)
+            if pairs[k] < 0:
+                return k
+    return starts.shape[0]
+
+
+_REACH = int64(float64, float64[::1], int64, int64, *BLOCKS.types)
+
+
+_TRY_STARTS = int64(*(*BLOCKS.types, *BLOCKS.types, float64[:, ::1], int64, float64[:, ::1], int64[::1]))
 
 
 class TaskError:
@@ -196,8 +267,6 @@ class TaskError:
         self._program = Program(robot, (task.function, task.reference, Comparison(task)), COMPILED)
         leads = np.eye(robot.n)
         leads[following.columns] = following.multipliers[:, np.newaxis] * leads[following.leaders]
-        # Angles of a platform and of joints without limits go where they like.
-        self._limits = np.where(robot.limited, robot.q_limits, [-np.inf, np.inf]).T.copy()
         newton = Newton(
             units=unit_codes(rows),
             met=np.array([MET * tolerance.m, MET * tolerance.rad, 1e-4]),
@@ -205,7 +274,8 @@ class TaskError:
                 [row.angular and task.function.comparison is None for row in rows], dtype=np.int64
             ),
             compared=np.array(int(task.function.comparison is not None), dtype=np.int64),
-            limits=self._limits,
+            # Angles of a platform and of joints without limits go where they like.
+            limits=np.where(robot.limited, robot.q_limits, [-np.inf, np.inf]).T.copy(),
             mimic_joints=following.table.ravel(),
             leads=leads,
             error=np.zeros(len(rows)),
@@ -214,12 +284,12 @@ class TaskError:
         )
         self._program.lay_out(newton)
         self._own = views(Newton, *self._program.blocks, BESIDE)
-        self._step = checked_by_caller(newton_step, _STEPPED)
+        self._reach = checked_by_caller(reach, _REACH)
 
     def evaluate(self, q: Array, t: float = 0.0) -> tuple[Array, Array, Array, Array]:
         """Value, target and error e (s,) at q (n,) and t, s, and ∂e/∂q (s, n)."""
         self._program.prepare(t, q)
-        self._step(t, q, 0, *self._program.blocks)
+        self._reach(t, q, 0, 0, *self._program.blocks)
         s, value = len(self._own.error), self._program.buffers.value
         return value[:s].copy(), value[s : 2 * s].copy(), self._own.error.copy(), self._own.error_q.copy()
 
@@ -229,17 +299,18 @@ class TargetSolver(TaskError):
 
     def __init__(self, robot: Robot, task: Task, tolerance: Goal) -> None:
         super().__init__(robot, task, tolerance)
+        self.calls_python, self.blocks = self._program.calls_python, self._program.blocks
+        self.try_starts = checked_by_caller(try_starts, _TRY_STARTS)
         targets = [self.evaluate(robot.rest, t)[1] for t in (0.0, 1.0, np.e)]
         if not all(np.array_equal(target, targets[0]) for target in targets):
             raise InputError("its target moves", where="plan: goal", expected="a task whose target stands")
 
     def __call__(self, q: Array) -> Array | None:
         """A configuration near q (n,) that reaches the target within a share of the tolerances, or None."""
-        q = self.robot.following.placed(np.clip(q, *self._limits))
-        self._own.held[:] = 1.0
-        for _ in range(STEPS):
-            self._program.prepare(0.0, q)
-            if self._step(0.0, q, 1, *self._program.blocks):
+        q, program = self.robot.following.placed(np.clip(q, *self._own.limits)), self._program
+        for k in range(STEPS):
+            program.prepare(0.0, q)
+            if self._reach(0.0, q, 1, int(k == 0), *program.blocks):
                 return q
         return None
 

@@ -20,7 +20,7 @@ from nmm.plugins.planning.holding import ARRIVED, FollowedPath, Held
 from nmm.plugins.planning.path import Guide
 from nmm.plugins.planning.problem import TURN
 from nmm.plugins.planning.samples import MotionSamples, SampledMotion
-from nmm.plugins.planning.timing import inputs_of_leg, spins_of
+from nmm.plugins.planning.timing import inputs_of_legs, spins_of
 
 #: The steps by which the arm follows, s, and its joints', rad or m, halved until what is held is off by no
 #: more than KEPT, m and rad, between nodes.
@@ -68,7 +68,7 @@ class HeldTiming:
         """The motion along one leg, and how much of the way between two nodes is gone at BETWEEN, (K, 3)."""
         robot, limits, p = self.robot, self.limits, self.held.platform
         rates = np.array([self.held.tangent(q, self._platform_rates(q, leg)) for q in nodes])
-        driven = inputs_of_leg(robot, nodes[0], leg)
+        driven = inputs_of_legs(robot, nodes[:1], leg[np.newaxis])[0]
         moved, arm = robot.rate_coordinates, np.flatnonzero(robot.rate_coordinates >= p)
         U = np.tile(driven, (len(nodes), 1))
         U[:, arm] = rates[:, moved[arm]]
@@ -79,7 +79,7 @@ class HeldTiming:
             speed = np.min(np.where(U >= 0.0, limits.inputs[:, 1], -limits.inputs[:, 0]) / np.abs(U), axis=1)
             usual = np.hstack([np.tile(leg[: 3 + p], (len(nodes), 1)), rates[:, p:]])
             speed = np.minimum(speed, np.min(self.usual / np.abs(usual), axis=1))
-            spins = spins_of(robot, nodes[[0, -1]], np.tile(driven, (2, 1)), limits)
+            spins = spins_of(robot, nodes[[0, -1]], np.tile(leg, (2, 1)), limits)
             speed = np.minimum(speed, np.min(limits.spin / spins, initial=np.inf))
         x = fastest(np.minimum(speed**2, 1e8), share, U, U_share, limits.changes)
         s = np.sqrt(x)

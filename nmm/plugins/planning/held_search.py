@@ -22,8 +22,7 @@ from nmm.plugins.planning.collisions.legs_check import MARGIN
 from nmm.plugins.planning.goals import ATTEMPTS, GoalPostures, Wanted, alternatives, nothing_found
 from nmm.plugins.planning.held_motion import ROUND, HeldTiming
 from nmm.plugins.planning.holding import ARRIVED, BLOCKED, LOST, Held
-from nmm.plugins.planning.path import shortened
-from nmm.plugins.planning.plan import Asked
+from nmm.plugins.planning.prepared import Asked
 from nmm.plugins.planning.samples import SampledMotion
 from nmm.plugins.planning.tree import Trees
 
@@ -225,12 +224,11 @@ class HeldWays:
             raise RunError(f"{what}: of {self.trees.looked[0]} motions {why}", where="plan")
 
     def shortened(self, start: Array, legs: Array, rounds: int) -> Array:
-        def blocked(q: Array, new: Array, whole: Array) -> int:
+        def blocked(whole: Array) -> bool:
             self.trees.looked[0] += 1
-            late = self.clock() < 0.0
-            return 0 if late or self.held.along(start, whole, TICK, FAR).ended != ARRIVED else -1
+            return self.clock() < 0.0 or self.held.along(start, whole, TICK, FAR).ended != ARRIVED
 
-        return shortened(self.guide, blocked, start, legs, rounds, self.rng, 3 + self._first)
+        return self.guide.shortened(start, legs, rounds, 3 + self._first, blocked)
 
 
 def refuse_beside_hold(robot: Robot, asked: Asked) -> None:

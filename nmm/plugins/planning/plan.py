@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, positive
 from nmm.base.errors import InputError
-from nmm.control.functions.objectives.base import Objective
 from nmm.control.functions.tasks.task import Task
 from nmm.control.goal import Goal
-from nmm.control.limits.collisions import Collisions
-from nmm.control.limits.limits import Limits, LimitsOn
+from nmm.control.limits.limits import LimitsOn
 from nmm.model.collisions.scene import Scene
 from nmm.model.robots.robot import Robot
 from nmm.motion.trajectory import Trajectory
 from nmm.plugins.planning.following import FromPlan
 from nmm.plugins.planning.goals import Wanted, goal_task
 from nmm.plugins.planning.objective import SampleCosts
+from nmm.plugins.planning.prepared import Asked, Prepared
 from nmm.plugins.planning.recorded import recorded
 from nmm.plugins.planning.samples import SampledMotion
 
@@ -46,30 +45,26 @@ class TimedMotion(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class Asked:
-    """What a plan is to keep, and how it is made: see `nmm.plan`."""
-
-    collisions: Collisions
-    limits: Limits
-    tolerance: Goal
-    smooth: bool = False
-    objective: Objective | None = None
-    effort: bool | Mapping[str, Any] = False
-    margin: float = 0.0
-    hold: Task | str | None = None
-
-
 class Found(NamedTuple):
-    """What a search leaves to a plan: its motion, what that keeps, what another search is made with, and the
-    trees that were grown, (E, 2, n)."""
+    """What a search leaves to a plan: its motion, its goal, the trees that were grown, (E, 2, n), and what
+    another search is made with."""
 
     motion: TimedMotion
-    limits: LimitsOn
-    scene: Scene | None
     goal: Wanted
-    asked: Asked
     tree: Array
+    prepared: Prepared
+
+    @property
+    def limits(self) -> LimitsOn:
+        return self.prepared.limits
+
+    @property
+    def scene(self) -> Scene | None:
+        return self.prepared.scene
+
+    @property
+    def asked(self) -> Asked:
+        return self.prepared.asked
 
 
 @dataclass(frozen=True, eq=False)

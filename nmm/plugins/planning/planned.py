@@ -6,27 +6,23 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from nmm.base.arrays import Array, counted, positive, scalar
-from nmm.base.errors import InputError, NmmError, RunError, expect_kind, few
-from nmm.control.functions.objectives.base import Objective
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError, NmmError, RunError, few
 from nmm.control.functions.tasks.task import Task
-from nmm.control.goal import Goal
-from nmm.control.limits.collisions import Collisions
-from nmm.control.limits.limits import Limits
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.collisions.scene import Scene
 from nmm.model.platforms.tractor import Tractor
 from nmm.model.robots.robot import Robot
-from nmm.plugins.planning.goals import Wanted, alternatives
+from nmm.plugins.planning.goals import alternatives
 from nmm.plugins.planning.held_motion import HeldTiming
 from nmm.plugins.planning.held_search import HeldWays, refuse_beside_hold
 from nmm.plugins.planning.holding import Held
-from nmm.plugins.planning.plan import Asked, Found, Plan, TimedMotion
+from nmm.plugins.planning.plan import Found, Plan, TimedMotion
+from nmm.plugins.planning.prepared import Prepared
 from nmm.plugins.planning.samples import SampledMotion, joined
 from nmm.plugins.planning.search import PlanSearch
 from nmm.plugins.planning.search_space import USUAL
@@ -37,107 +33,6 @@ from nmm.plugins.planning.waiting import LONG, waited
 
 #: Ways that are tried among obstacles that move, and how often each but the first is shortened.
 WAYS, SHORTEN = 8, 50
-
-
-def plan(
-    robot: Robot,
-    start: ArrayLike | Mapping[str, float],
-    goal: Wanted,
-    obstacles: Sequence[Obstacle] = (),
-    collisions: Collisions | None = None,
-    limits: Limits | None = None,
-    seconds: float = 10.0,
-    seed: int = 0,
-    *,
-    tolerance: Goal | None = None,
-    through: Sequence[Wanted] = (),
-    shorten: int = 200,
-    smooth: bool = False,
-    objective: Objective | None = None,
-    effort: bool | Mapping[str, Any] = False,
-    margin: float = 0.0,
-    hold: Task | str | None = None,
-    progress: Callable[[float], None] | None = None,
-) -> Plan:
-    """A motion from start to goal that keeps every distance and limit.
-
-    Parameters
-    ----------
-    start : (n,) or by name, m and rad
-    goal : a configuration (n,); coordinates by name, of which the others are free; a `Task` whose target
-        stands; or a list of these, of which one is to be reached
-    obstacles : those with a `motion` are waited for: the way is looked for among the others, which stand
-        where they are at t = 0; where no timing of it works, other ways are tried
-    collisions : distances to keep, with obstacles of its own; `Collisions()` with the obstacles when not
-        given
-    limits : of velocity, acceleration and position; the robot's own when not given
-    seconds : after which the search gives up
-    seed : of the random numbers; the same plan comes of the same seed
-    tolerance : of a task's goal; `Goal()` when not given
-    through : goals that are reached on the way, in order
-    shorten : how often a shorter way between two points of the motion is tried
-    smooth : whether to look for one motion without rests, which takes about half the time and 0.1 to 0.5 s
-        more to plan; where none is found that keeps everything, the one with rests stands (`Plan.smooth`). A
-        tractor's with trailers always is
-    objective : H(q) to minimise along a smooth motion, in the time that it takes without: each of its samples
-        costs 0.3 for an input at its limit, 1 for a rate of it at its limit, by their squares, and H
-    effort : whether motors keep the torque limits of the robot's file, or masses that the robot carries then,
-        kg by frame (as `payload` of `nmm.Dynamics`); what needs more is driven slower
-    margin : so much farther than the distance, m, it keeps off what start and goals leave so much room to,
-        where such a motion is found in half of the time; for a controller that follows it (`Plan.reference`)
-    hold : a frame whose pose stays what it is at the start while the platform moves, or a `Task` whose target
-        the start has (`Task(Position("tool"), p)`); goals are then poses of the platform, x, y and theta, and
-        the arm's posture there comes of the way. It rests between the platform's arcs and lines
-    progress : called with the share of `seconds` that is gone
-
-    Returns
-    -------
-    Plan; it stands between two of its legs unless it is smooth, and ends at rest.
-
-    Raises
-    ------
-    InputError : a start that touches something or is outside limits, a goal of another kind, limits of
-        functions, a platform whose ways are not known, an objective that changes with time or without smooth,
-        what the arm alone cannot hold
-    RunError : no goal configuration was found, or no way there, or of a tractor with trailers no exact motion
-        along it; the text says what was tried
-
-    Examples
-    --------
-    >>> robot = nmm.load("unicycle_3r")
-    >>> wall = nmm.Obstacle(nmm.Box([0.2, 4.0, 2.0]), [3.0, 0.0, 0.5], name="wall")
-    >>> plan = nmm.plan(robot, {"q1": 0.5}, {"x": 6.0, "y": 0.0, "theta": 0.0}, [wall])
-    >>> np.allclose(plan.end[:3], [6.0, 0.0, 0.0], atol=1e-9)
-    True
-    """
-    q = robot.following.placed(robot.q(start))
-    robot.check_limits(q)
-    limits = Limits() if limits is None else limits
-    expect_kind(limits, Limits, "plan: limits", "Limits")
-    if limits.bounds:
-        raise InputError("limits of functions are not planned for", where="plan: limits")
-    n_p, ends = robot.platform.n_p, np.asarray(robot.limited.all(axis=1))
-    endless = [robot.q_names[i] for i in range(n_p, robot.n) if robot.q_units[i] == "m" and not ends[i]]
-    if endless:  # nothing bounds how far what it carries is from the joints before it
-        raise InputError(
-            f"{few(endless)}: slides without limits", where="plan: robot", expected="limits of it"
-        )
-    smooth = smooth or isinstance(robot.platform, Tractor)
-    if objective is not None and not smooth:
-        raise InputError("smooth motions alone have one", where="plan: objective", expected="smooth=True")
-    settings = collisions or Collisions()
-    asked = Asked(
-        collisions=replace(settings, obstacles=(*settings.obstacles, *obstacles)),
-        limits=limits,
-        tolerance=tolerance or Goal(),
-        smooth=smooth,
-        objective=objective,
-        effort=effort,
-        margin=scalar(margin, "plan: margin", least=0.0),
-        hold=hold,
-    )
-    search = PlanSearch(robot, q, [*through, goal], asked, seed)
-    return planned(search, positive(seconds, "seconds"), counted(shorten, "shorten", 0), progress)
 
 
 def planned(
@@ -162,7 +57,7 @@ def planned(
 
 def finished(search: PlanSearch, *parts: Array) -> Plan:
     """The plan of legs from the start; a smooth one rests between the parts."""
-    path = _timed(search, search.start, np.vstack(parts))
+    path = _timed(search, search.start, *parts)
     motion: TimedMotion = path
     if search.movers is not None:
         motion = _waited(search, path, search.movers)
@@ -202,7 +97,7 @@ def _another_way(search: PlanSearch, at: float | None, k: int, seconds: float) -
             Obstacle(obstacle.shape, obstacle.placement(at), name=obstacle.name) for obstacle in moves
         ]
     asked = replace(search.asked, collisions=replace(collisions, obstacles=tuple(standing)), smooth=False)
-    other = PlanSearch(search.robot, search.start, search.goals, asked, search.seed + k)
+    other = PlanSearch(Prepared(search.robot, asked), search.start, search.goals, search.seed + k)
     return planned(other, seconds, SHORTEN, None).found
 
 
@@ -270,9 +165,10 @@ def _holding(search: PlanSearch, hold: Task | str, shorten: int, begin: Callable
     return _found(search, joined(motions) if motions else _still(search, q))
 
 
-def _timed(search: PlanSearch, start: Array, legs: Array) -> TimedLegs:
-    guide = search.guide
-    motion = timed(guide, search.robot, start, guide.merged(legs), search.limits, search.usual)
+def _timed(search: PlanSearch, start: Array, *parts: Array) -> TimedLegs:
+    """The parts one after the other, with a rest between two of them."""
+    guide, legs = search.guide, np.vstack([search.guide.merged(part) for part in parts])
+    motion = timed(guide, search.robot, start, legs, search.limits, search.usual)
     return motion if search.efforts is None else search.efforts.legs(motion)
 
 
@@ -290,5 +186,5 @@ def _found(search: PlanSearch, motion: TimedMotion) -> Plan:
 
 
 def _plan(search: PlanSearch, motion: TimedMotion, motions: int, postures: int) -> Plan:
-    result = Found(motion, search.limits, search.scene, search.goals[-1], search.asked, search.tree)
+    result = Found(motion, search.goals[-1], search.tree, search.prepared)
     return Plan(search.robot, motions, postures, result)

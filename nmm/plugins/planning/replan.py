@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -16,7 +15,8 @@ from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.platforms.tractor import Tractor
 from nmm.plugins.planning.plan import Plan
 from nmm.plugins.planning.planned import finished
-from nmm.plugins.planning.search import STEP, PlanSearch
+from nmm.plugins.planning.prepared import STEP
+from nmm.plugins.planning.search import PlanSearch
 
 #: Times at which the plan's nearest point is looked for, s apart.
 NEAR = 0.05
@@ -75,13 +75,20 @@ def replan(
         raise InputError("a plan that holds something is not replanned", where="replan: plan")
     start = robot.following.placed(robot.q(q))
     robot.check_limits(start)
-    asked = old.asked
-    if obstacles is not None:
-        asked = replace(asked, collisions=replace(asked.collisions, obstacles=tuple(obstacles)))
-    if any(obstacle.moves for obstacle in asked.collisions.obstacles):
+    if obstacles is None:
+        obstacles = old.asked.collisions.obstacles
+    if any(obstacle.moves for obstacle in obstacles):
         raise InputError("obstacles that move along a path are not replanned for", where="replan: obstacles")
-    search = PlanSearch(robot, start, [old.goal], asked, seed)
-    search.begin(positive(seconds, "seconds"), progress)
+    prepared = old.prepared.among(obstacles)
+    with prepared.lock:
+        search = PlanSearch(prepared, start, [old.goal], seed)
+        search.begin(positive(seconds, "seconds"), progress)
+        return _joined(search, plan, t, counted(shorten, "shorten", 0))
+
+
+def _joined(search: PlanSearch, plan: Plan, t: float | None, shorten: int) -> Plan:
+    """The plan from a search's start on: the rest of another, joined, or what is found from its parts."""
+    start = search.start
     rest = _rest(plan, start, t)
     if search.check.too_near(rest[-1]) < 0:
         search.widen(start, rest[-1])
@@ -96,9 +103,9 @@ def replan(
     ahead: list[Array] = [] if joined is None else rest[joined : first + 1]
     goals, behind = rest[-1:], rest[last:-1]
     if search.check.too_near(rest[-1]) >= 0:
-        goals, behind = search.ends(old.goal, start), []
+        goals, behind = search.ends(plan.found.goal, start), []
     legs = search.farther(start, goals, ahead, behind)
-    return finished(search, search.shortened(start, legs, counted(shorten, "shorten", 0)))
+    return finished(search, search.shortened(start, legs, shorten))
 
 
 def _rest(plan: Plan, q: Array, t: float | None) -> list[Array]:

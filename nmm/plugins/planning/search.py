@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from typing import TypeVar
@@ -15,84 +14,56 @@ import numpy as np
 from nmm.base.arrays import Array, counted
 from nmm.base.errors import InputError, RunError, few
 from nmm.base.kernels.compiled import checked_by_caller
-from nmm.base.kernels.record_layout import views
-from nmm.model.robots.robot import Robot
 from nmm.plugins.planning import tree
 from nmm.plugins.planning.collisions.legs_check import MARGIN
-from nmm.plugins.planning.collisions.motion_check import MotionCheck
-from nmm.plugins.planning.effort import efforts_of
 from nmm.plugins.planning.goals import GoalPostures, Wanted, alternatives, nothing_found
-from nmm.plugins.planning.objective import SampleCosts
-from nmm.plugins.planning.path import Guide, shortened
-from nmm.plugins.planning.plan import Asked
-from nmm.plugins.planning.search_space import drawn_within, leg_speeds, pause_between, usual_speeds
-from nmm.plugins.planning.tree import PLACE, Trees
-from nmm.plugins.planning.ways import LEGS, ways_of
+from nmm.plugins.planning.path import Guide
+from nmm.plugins.planning.prepared import Prepared
+from nmm.plugins.planning.search_space import drawn_within
+from nmm.plugins.planning.tree import SPARE, Trees
+from nmm.plugins.planning.ways import LEGS
 
-#: Room for configurations in each tree, and rounds of a search between two looks at the clock.
-ROOM, ROUNDS = 20_000, 200
-#: The longest motion by which a tree grows, s.
-STEP = 2.0
+#: Rounds of a search between two looks at the clock.
+ROUNDS = 200
+#: After so many motions a search that began with known ways begins anew without them: all that grows may be
+#: nearest to a dead end.
+ALONE = 1000
 
 T = TypeVar("T")
 
 
 class PlanSearch:
-    """What one plan needs: the trees, the check of distances, and the goals."""
+    """What one plan needs: where it begins, its goals, and what is `prepared` for it."""
 
     _ends: float
     asked_kept: Array
     tree: Array
 
-    def __init__(
-        self,
-        robot: Robot,
-        start: Array,
-        goals: Sequence[Wanted],
-        asked: Asked,
-        seed: int = 0,
-    ) -> None:
-        self.robot, self.start, self.goals, self.asked = robot, start, goals, asked
+    def __init__(self, prepared: Prepared, start: Array, goals: Sequence[Wanted], seed: int = 0) -> None:
+        self.prepared, self.start, self.goals = prepared, start, goals
+        self.robot, self.asked, self.scene, self.movers, self.efforts, self.costs = (
+            *(prepared.robot, prepared.asked, prepared.scene, prepared.movers),
+            *(prepared.efforts, prepared.costs),
+        )
+        self.limits, self.usual, self.check = prepared.limits, prepared.usual, prepared.check
         self.seed = seed = counted(seed, "seed", 0)
-        self.tree = np.zeros((0, 2, robot.n))
+        self.tree = np.zeros((0, 2, self.robot.n))
         self.rng = np.random.default_rng(seed)
-        self.costs = None
-        if asked.smooth and asked.objective is not None:
-            self.costs = SampleCosts(robot, asked.objective)
-        self.efforts, collisions = efforts_of(robot, asked.effort), asked.collisions
-        known = bool(collisions.obstacles) or len(robot.collision_model.collisionPairs) > 0
-        self.scene = collisions.on(robot) if known else None
-        movers, scene = [obstacle for obstacle in collisions.obstacles if obstacle.moves], self.scene
-        self.movers = None
-        if movers:  # the way is looked for among what stands, and its timing among what moves
-            self.movers = replace(collisions, obstacles=movers, self_collisions=False).on(robot)
-            stands = [obstacle for obstacle in collisions.obstacles if not obstacle.moves]
-            own = collisions.self_collisions and len(robot.collision_model.collisionPairs) > 0
-            scene = replace(collisions, obstacles=stands).on(robot) if stands or own else None
-        self.limits = asked.limits.on(robot)
-        self.usual = usual_speeds(robot, self.limits)
-        speeds, reverses = leg_speeds(robot, self.limits, self.usual), self.limits.inputs[:1, 0] < 0.0
-        ways = ways_of(
-            robot, speeds, pause_between(self.limits), bool(np.all(reverses)), self.limits.coordinates
-        )
-        self.low, self.high = drawn_within(robot, start, goals, collisions.obstacles)
-        trees = Trees(
-            ways=ways,
-            low=self.low,
-            high=self.high,
-            step=np.array(STEP),
-            nodes=np.zeros((2, ROOM, robot.n)),
-            parents=np.zeros((2, ROOM), dtype=np.int64),
-            counts=np.zeros(2, dtype=np.int64),
-            roots=np.zeros(2, dtype=np.int64),
-            random=np.array([1 + seed % (tree.MODULUS - 1)], dtype=np.int64),
-            met=np.zeros(2, dtype=np.int64),
-            looked=np.zeros(2, dtype=np.int64),
-        )
-        self.check = MotionCheck(robot, scene, trees)
-        self.trees = views(Trees, *self.check.blocks, PLACE)
-        self.guide = Guide(self.check.blocks, robot.platform.n_p >= 3, robot.following.table.ravel())
+        self.low, self.high = drawn_within(self.robot, start, goals, self.asked.collisions.obstacles)
+        trees = self.trees
+        trees.low[:], trees.high[:] = self.low, self.high
+        trees.random[:] = 1 + seed % (tree.MODULUS - 1)
+        trees.counts[:] = trees.roots[:] = trees.looked[:] = 0
+        self.check.forget()
         self._search = checked_by_caller(tree.search, tree.SEARCH)
+
+    @property
+    def trees(self) -> Trees:
+        return self.prepared.trees
+
+    @property
+    def guide(self) -> Guide:
+        return self.prepared.guide
 
     def farther(
         self, start: Array, ends: Sequence[Array], ahead: Sequence[Array] = (), behind: Sequence[Array] = ()
@@ -141,12 +112,8 @@ class PlanSearch:
 
     def shortened(self, start: Array, legs: Array, rounds: int) -> Array:
         """Shorter legs from a configuration."""
-        first = 3 + (0 if self.robot.platform.n_p < 3 else self.robot.platform.n_p)
-
-        def blocked(q: Array, new: Array, whole: Array) -> int:
-            return self.blocked(q, new)
-
-        return shortened(self.guide, blocked, start, legs, rounds, self.rng, first)
+        arm = 3 + (0 if self.robot.platform.n_p < 3 else self.robot.platform.n_p)
+        return self.guide.shortened(start, legs, rounds, arm)
 
     def blocked(self, start: Array, legs: Array) -> int:
         """The number of a pair that comes too near on legs from a free configuration, or -1; counted."""
@@ -177,6 +144,9 @@ class PlanSearch:
             legs = self.guide.way(start, goal)
             if self.blocked(start, legs) < 0:
                 return legs.copy()
+        most = max(1 + len(ahead), len(goals) + len(behind)) + SPARE
+        while self.trees.parents.shape[1] < most and self.prepared.enlarge():
+            pass
         trees = self.trees
         grown: tuple[tuple[Sequence[Array], Sequence[Array]], ...] = (([start], ahead), (goals, behind[::-1]))
         for k, (roots, chain) in enumerate(grown):
@@ -185,12 +155,17 @@ class PlanSearch:
             trees.nodes[k, :count] = [*roots, *chain]
             trees.parents[k, : len(roots)] = -1
             trees.parents[k, len(roots) : count] = [0, *range(len(roots), count - 1)][: len(chain)]
-        scratch = np.zeros((LEGS, 3 + self.robot.n))
+        scratch, looked = np.zeros((LEGS, 3 + self.robot.n)), int(trees.looked[0])
         while True:
             outcome = self._search(*self.check.blocks, ROUNDS, scratch)
-            left = self.left()
+            left, trees = self.left(), self.trees
             if outcome > 0:
                 break
+            if outcome < 0 and self.prepared.enlarge():
+                continue
+            if (ahead or behind) and trees.looked[0] - looked > ALONE:
+                trees.counts[:], ahead, behind = trees.roots, (), ()
+                continue
             if outcome < 0 or left < 0.0:
                 what = "no room for more configurations" if outcome < 0 else f"{self._seconds:g} s"
                 raise RunError(

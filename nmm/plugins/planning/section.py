@@ -124,7 +124,7 @@ class PlanSection(Section):
 
     def motion(self, making: Making) -> Plan:
         """The planned motion; `RunError` where none is found."""
-        from nmm.plugins.planning.planned import plan
+        from nmm.plugins.planning.planner import plan
 
         robot, parts = making.robot, making.parts
         for k, coordinates in enumerate([self.to, *self.through]):

@@ -10,7 +10,7 @@ import numpy as np
 from nmm.base.arrays import Array, Integers
 from nmm.control.limits.limits import LimitsOn
 from nmm.model.robots.robot import Robot
-from nmm.model.robots.wheel_rates import turning_wheels
+from nmm.model.robots.wheel_rates import wheel_shares
 from nmm.plugins.planning.path import Guide
 
 
@@ -65,16 +65,15 @@ def timed(guide: Guide, robot: Robot, start: Array, legs: Array, limits: LimitsO
     """The legs from start (n,), each as fast as the limits allow; usual (3 + n,) : speeds of
     a leg's numbers where inputs have none."""
     corners = guide.corners(start, legs)
-    inputs = np.array([inputs_of_leg(robot, q, leg) for q, leg in zip(corners[:-1], legs, strict=True)])
-    inputs = inputs.reshape(-1, robot.n_u)
+    inputs = inputs_of_legs(robot, corners[:-1], legs)
     falling, rising = -limits.changes[:, 0], limits.changes[:, 1]
     forwards = inputs >= 0.0
     reached = np.where(forwards, limits.inputs[:, 1], -limits.inputs[:, 0])
     with np.errstate(divide="ignore"):
         speed = np.min(reached / np.abs(inputs), axis=1, initial=np.inf)
         speed = np.minimum(speed, np.min(usual / np.abs(legs), axis=1, initial=np.inf))
-        spins = np.maximum(*(spins_of(robot, q, inputs, limits) for q in (corners[:-1], corners[1:])))
-        speed = np.minimum(speed, np.min(limits.spin / spins, axis=1, initial=np.inf))
+        for q in (corners[:-1], corners[1:]) if len(limits.spin) else ():
+            speed = np.minimum(speed, np.min(limits.spin / spins_of(robot, q, legs, limits), axis=1))
         acceleration, braking = (
             np.min(change / np.abs(inputs), axis=1, initial=np.inf)
             for change in (np.where(forwards, rising, falling), np.where(forwards, falling, rising))
@@ -89,18 +88,28 @@ def timed(guide: Guide, robot: Robot, start: Array, legs: Array, limits: LimitsO
     )
 
 
-def spins_of(robot: Robot, q: Array, inputs: Array, limits: LimitsOn) -> Array:
-    """How far limited wheels turn on each leg, (L, w), rad: at q (L, n), where it begins or ends."""
-    ways = np.array([robot.S(corner) @ u for corner, u in zip(q, inputs, strict=True)]).reshape(-1, robot.n)
-    names, rates = turning_wheels(robot, q, ways)
-    return np.abs(rates[:, [names.index(name) for name in limits.rows[: len(limits.spin)]]])
-
-
-def inputs_of_leg(robot: Robot, q: Array, leg: Array) -> Array:
-    """What the inputs add up to on a leg from q: its twist in the world and its joints' ways by S⁺ (S u =
-    them)."""
-    way = leg[3:].copy()
+def ways_of_legs(robot: Robot, q: Array, legs: Array) -> Array:
+    """Legs (L, 3 + n) as ways of the coordinates, (L, n), at q (L, n): the platform's twist in the world."""
+    ways = legs[:, 3:].copy()
     if robot.platform.n_p >= 3:
-        c, s = np.cos(q[2]), np.sin(q[2])
-        way[:3] = c * leg[0] - s * leg[1], s * leg[0] + c * leg[1], leg[2]
-    return np.asarray(np.linalg.lstsq(robot.S(q), way, rcond=None)[0], dtype=np.float64)
+        c, s = np.cos(q[:, 2]), np.sin(q[:, 2])
+        ways[:, 0], ways[:, 1] = c * legs[:, 0] - s * legs[:, 1], s * legs[:, 0] + c * legs[:, 1]
+        ways[:, 2] = legs[:, 2]
+    return ways
+
+
+def spins_of(robot: Robot, q: Array, legs: Array, limits: LimitsOn) -> Array:
+    """How far limited wheels turn on each leg, (L, w), rad: at q (L, n), where it begins or ends."""
+    turned = np.einsum("kwi,ki->kw", wheel_shares(limits.wheels, q), ways_of_legs(robot, q, legs))
+    return np.asarray(np.abs(turned))
+
+
+def inputs_of_legs(robot: Robot, q: Array, legs: Array) -> Array:
+    """What the inputs add up to on legs from q (L, n): by G⁺ those of the platform (S u = the legs' ways)."""
+    n_p, p, ways = robot.platform.n_p, robot.platform.p, ways_of_legs(robot, q, legs)
+    inputs = np.zeros((len(legs), robot.n_u))
+    inputs[:, p:] = ways[:, robot.arm_coordinates]
+    if len(legs) and p:
+        G = np.array([robot.platform.G(corner[:n_p]) for corner in q])
+        inputs[:, :p] = np.einsum("kji,ki->kj", np.linalg.pinv(G), ways[:, :n_p])
+    return inputs

@@ -33,6 +33,8 @@ from nmm.plugins.planning.ways import Ways, find_way, least_time, leg_time, way_
 
 #: Of random configurations, the share whose arm is between those of a start and a goal.
 BETWEEN = 0.5
+#: A round of a search adds fewer configurations than this.
+SPARE = 200
 #: The multiplier and the modulus of the random numbers (S. K. Park, K. W. Miller, 1988).
 MULTIPLIER, MODULUS = 48271, 2**31 - 1
 
@@ -162,7 +164,7 @@ def search(integers: Integers, floats: Array, rounds: int, legs: Array) -> int:
     for k in range(rounds):
         tree = k % 2
         draw_configuration(trees, scene.planar[()], scene.mimic_joints, q)
-        if max(trees.counts[0], trees.counts[1]) + 200 >= trees.parents.shape[1]:
+        if max(trees.counts[0], trees.counts[1]) + SPARE >= trees.parents.shape[1]:
             return -1
         if grow(scene, integers, floats, trees, tree, q, legs) < 0:
             continue

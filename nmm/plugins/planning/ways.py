@@ -1,6 +1,7 @@
 """How a platform gets from one configuration to another where nothing is in the way, compiled, as legs."""
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -192,6 +193,23 @@ def ways_of(robot: Robot, speeds: Array, pause: float, reverses: bool, limits: A
     ------
     InputError : a platform whose ways are not known (wheels that steer on their own)
     """
+    kind, radius, rolling, steering, wheelbase = _of_platform(robot, reverses)
+    return Ways(
+        kind=np.array(kind, dtype=np.int64),
+        radius=np.array(radius),
+        rolling=rolling.copy(),
+        steering=np.array(steering, dtype=np.int64),
+        wheelbase=np.array(wheelbase),
+        speeds=speeds,
+        pause=np.array(pause),
+        turns=robot.turns(limits),
+        own_or_leader=robot.own_or_leader.copy(),
+    )
+
+
+@lru_cache(maxsize=8)
+def _of_platform(robot: Robot, reverses: bool) -> tuple[int, float, Array, int, float]:
+    """Kind, radius, rolling, steering and wheelbase of a robot's `Ways`."""
     platform = robot.platform
     kind, radius, rolling, steering, wheelbase = STANDS, 1.0, np.zeros(3), -1, 0.0
     if platform.n_p >= 3:
@@ -223,17 +241,7 @@ def ways_of(robot: Robot, speeds: Array, pause: float, reverses: bool, limits: A
                 expected="one that stands, moves every way, turns on the spot, steers one axle as a car "
                 "or is a tractor",
             )
-    return Ways(
-        kind=np.array(kind, dtype=np.int64),
-        radius=np.array(radius),
-        rolling=rolling,
-        steering=np.array(steering, dtype=np.int64),
-        wheelbase=np.array(wheelbase),
-        speeds=speeds,
-        pause=np.array(pause),
-        turns=robot.turns(limits),
-        own_or_leader=robot.own_or_leader.copy(),
-    )
+    return kind, radius, rolling, steering, wheelbase
 
 
 def _plain(axle: SteeredAxle) -> bool:

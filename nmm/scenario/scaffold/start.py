@@ -115,7 +115,7 @@ class _Look:
         distances = measured_pairs(
             robot, shapes, [pair for pair in pairs if of_arm[pair[0]] or of_arm[pair[1]]]
         )
-        return lambda q: int((distances(q) < 0.0).sum())
+        return lambda q: int((distances(q, 0.0) < 0.0).sum())
 
 
 def _posture(look: _Look, axes: str) -> Start | None:

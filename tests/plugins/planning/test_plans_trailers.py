@@ -5,7 +5,7 @@ import pytest
 from test_smoothing import LIMITS, check
 
 import nmm
-from nmm.plugins.planning.plan import Asked
+from nmm.plugins.planning.prepared import Asked, Prepared
 from nmm.plugins.planning.search import PlanSearch
 from nmm.plugins.planning.search_space import USUAL
 from nmm.plugins.planning.smoothing import Smoothing
@@ -96,7 +96,7 @@ def test_on_the_least_arcs_hitches_settle_within_their_share_of_the_limit(hitch)
 def test_the_solver_makes_a_motion_of_a_long_way_backwards(train):
     """On which hitches fold, so that what rounding leaves in it grows."""
     asked = Asked(nmm.Collisions(), LIMITS, nmm.Goal())
-    search = PlanSearch(train, train.rest, [{"x": -25.0}], asked)
+    search = PlanSearch(Prepared(train, asked), train.rest, [{"x": -25.0}])
     t = np.linspace(0.0, 40.0, 100)
     q, u = np.zeros((100, 5)), np.zeros((99, 2))
     q[:, 0], q[-1, 1], u[:, 0] = -25.0 * t / 40.0, 0.3, -25.0 / 40.0

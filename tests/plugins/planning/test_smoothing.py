@@ -6,7 +6,7 @@ import pytest
 import nmm
 from nmm.model.robots.wheel_rates import turning_wheels
 from nmm.model.robots.zero_order_hold import inputs_of
-from nmm.plugins.planning.plan import Asked
+from nmm.plugins.planning.prepared import Asked, Prepared
 from nmm.plugins.planning.samples import flow
 from nmm.plugins.planning.search import PlanSearch
 from nmm.plugins.planning.search_space import USUAL
@@ -137,7 +137,7 @@ def prepared(obstacles, plan):
     """The smoothing of the timed path of a plan's problem."""
     robot, before = plan.robot, planned("unicycle_3r", smooth=False)
     asked = Asked(nmm.Collisions(obstacles=obstacles), LIMITS, nmm.Goal(), smooth=True)
-    search = PlanSearch(robot, before.corners[0], [BEHIND], asked)
+    search = PlanSearch(Prepared(robot, asked), before.corners[0], [BEHIND])
     return Smoothing(robot, search.limits, USUAL, search.check), before.found.motion
 
 

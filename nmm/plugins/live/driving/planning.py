@@ -24,7 +24,7 @@ from nmm.model.robots.motion import Motion
 from nmm.plugins.live.driving.driven import Driven
 from nmm.plugins.live.driving.setups import led_by
 from nmm.plugins.planning.plan import Plan
-from nmm.plugins.planning.planned import plan
+from nmm.plugins.planning.planner import plan
 from nmm.views.playback.drawing import Command, packed
 from nmm.views.playback.keyframes import ghost_samples
 from nmm.views.playback.shapes import DrawnRobot

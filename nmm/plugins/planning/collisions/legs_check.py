@@ -39,7 +39,9 @@ class MovedShapes(NamedTuple):
         not move can reach, m; else infinite
     kept (P,) : distances to keep, m
     drift (P,) : how far the obstacle of a pair moves at most during the motion that is looked at, m
-    until (P,), places (G, 12) : while a leg is looked at, how much of it is surely free; where shapes are
+    until (P,), fastest (P,), bends (P,) : while a leg is looked at, how much of it is surely free; `approach`
+        and, once it was asked for, `bend`
+    places (G, 12), centres (G, 3) : where shapes are, and the centres of their boxes, in the world
     """
 
     shapes: ConvexShapes
@@ -53,7 +55,10 @@ class MovedShapes(NamedTuple):
     kept: Vector
     drift: Vector
     until: Vector
+    fastest: Vector
+    bends: Vector
     places: Matrix
+    centres: Matrix
 
 
 @compiled
@@ -76,34 +81,43 @@ def along(planar: int, q: Array, leg: Array, share: float, mimic_joints: Array, 
 @compiled
 def place_shape(scene: MovedShapes, joints: Array, shape: int) -> None:
     """Where a shape is while the joints (J, 12) are there."""
-    compose(joints, scene.carrier[shape], scene.place, shape, scene.places, shape)
+    places, boxes = scene.places, scene.shapes.boxes
+    compose(joints, scene.carrier[shape], scene.place, shape, places, shape)
+    for k in range(3):
+        scene.centres[shape, k] = places[shape, 9 + k]
+        for i in range(3):
+            scene.centres[shape, k] += places[shape, 3 * i + k] * boxes[shape, i]
 
 
 @compiled
-def placed_bound(scene: MovedShapes, pair: int, enough: float) -> float:
-    """A lower bound of the distance of a pair where its shapes were placed; rough above `enough`."""
-    shapes, places = scene.shapes, scene.places
+def placed_bound(scene: MovedShapes, pair: int, enough: float, least: float) -> float:
+    """A lower bound of the distance of a pair where its shapes were placed; rough above `enough`, and above
+    `least` as `separation` is."""
+    shapes, places, centres = scene.shapes, scene.places, scene.centres
     i, j = shapes.pairs[pair, 0], shapes.pairs[pair, 1]
     if j < shapes.planes[()]:
-        square = 0.0
-        for k in range(3):
-            d = places[i, 9 + k] - places[j, 9 + k]
-            for axis in range(3):
-                d += places[i, 3 * axis + k] * shapes.boxes[i, axis]
-                d -= places[j, 3 * axis + k] * shapes.boxes[j, axis]
+        square = beyond = 0.0
+        for axis in range(3):
+            d = centres[i, axis] - centres[j, axis]
             square += d * d
-        apart = math.sqrt(square) - shapes.boxes[i, 6] - shapes.boxes[j, 6]
+            off = 0.0
+            for k in range(3):
+                off += places[j, 3 * axis + k] * (centres[i, k] - centres[j, k])
+            outside = max(abs(off) - shapes.boxes[j, 3 + axis], 0.0)
+            beyond += outside * outside
+        # Between the balls around both, and between the first one's and the second one's box.
+        apart = max(math.sqrt(square) - shapes.boxes[j, 6], math.sqrt(beyond)) - shapes.boxes[i, 6]
         if apart >= enough:
             return apart
-    return separation(shapes, places, pair, enough)
+    return separation(shapes, places, pair, enough, least)
 
 
 @compiled
-def pair_bound(scene: MovedShapes, joints: Array, pair: int, enough: float) -> float:
+def pair_bound(scene: MovedShapes, joints: Array, pair: int, enough: float, least: float) -> float:
     """`placed_bound` where the joints (J, 12) are."""
     place_shape(scene, joints, scene.shapes.pairs[pair, 0])
     place_shape(scene, joints, scene.shapes.pairs[pair, 1])
-    return placed_bound(scene, pair, enough)
+    return placed_bound(scene, pair, enough, least)
 
 
 @compiled
@@ -131,7 +145,7 @@ def write_approach(scene: MovedShapes, joints: Array, twists: Array, pair: int, 
         joint, sign = scene.carrier[shape], 1.0 if side == 0 else -1.0
         if joint == 0:
             continue
-        extreme(shapes, places, shape, d, -sign, point)
+        extreme(shapes, places, shape, d, -sign, 2 * pair + side, point)
         while joint > 0:
             moved(joints, twists, joint, point[0], point[1], point[2], v)
             out[table.coordinate[joint]] += sign * (d[0] * v[0] + d[1] * v[1] + d[2] * v[2])
@@ -143,9 +157,11 @@ def too_near(scene: MovedShapes, q: Array) -> int:
     """The first pair that is too near at q, or -1."""
     joints = scratch((scene.joints.parent.shape[0], 12))
     place_joints(scene.joints, q, joints)
+    for shape in range(scene.carrier.shape[0]):
+        place_shape(scene, joints, shape)
     for pair in range(scene.kept.shape[0]):
-        least = scene.kept[pair] + MARGIN
-        if pair_bound(scene, joints, pair, least) < least:
+        least = scene.kept[pair]
+        if placed_bound(scene, pair, least + MARGIN, least) < least + MARGIN:
             return pair
     return -1
 
@@ -209,7 +225,8 @@ def speed_towards(scene: MovedShapes, q: Array, leg: Array, joints: Array, twist
                     speed += rate * d[i] * twists[joint, i] - across * joints[joint, 9 + i]
             joint = table.parent[joint]
         if scene.carrier[shape] > 0:
-            extreme(shapes, scene.places, shape, turn, sign, point)
+            slot = 2 * (shapes.pairs.shape[0] + pair) + side
+            extreme(shapes, scene.places, shape, turn, sign, slot, point)
             fastest += sign * (speed + dot(turn, point)) + shapes.rounding[shape] * norm(turn)
     return fastest
 
@@ -218,7 +235,8 @@ def speed_towards(scene: MovedShapes, q: Array, leg: Array, joints: Array, twist
 def begin_motion(scene: MovedShapes, leg: Array) -> None:
     """Forget what was known of a motion before; no number changes faster on this one than along the leg."""
     for pair in range(scene.kept.shape[0]):
-        scene.until[pair] = 0.0 if approach(scene, pair, leg, math.inf) > 0.0 else math.inf
+        scene.fastest[pair], scene.bends[pair] = approach(scene, pair, leg, math.inf), -1.0
+        scene.until[pair] = 0.0 if scene.fastest[pair] > 0.0 else math.inf
 
 
 @compiled
@@ -234,14 +252,16 @@ def look(scene: MovedShapes, q: Array, leg: Array, share: float, joints: Array, 
     for pair in range(scene.kept.shape[0]):
         if scene.until[pair] <= share:
             least = scene.kept[pair]
-            fastest = approach(scene, pair, leg, math.inf)
-            apart = pair_bound(scene, joints, pair, least + MARGIN + fastest * (1.0 - share))
+            enough = least + MARGIN + scene.fastest[pair] * (1.0 - share)
+            apart = pair_bound(scene, joints, pair, enough, least)
             if apart < least + MARGIN:
                 return -1.0 - pair
             free = (apart - least) / approach(scene, pair, leg, apart)
             if steady == 1 and share + free < 1.0:
                 speed = speed_towards(scene, q, leg, joints, twists, pair)
-                root = math.sqrt(speed * speed + 2.0 * (apart - least) * bend(scene, pair, leg))
+                if scene.bends[pair] < 0.0:
+                    scene.bends[pair] = bend(scene, pair, leg)
+                root = math.sqrt(speed * speed + 2.0 * (apart - least) * scene.bends[pair])
                 free = max(free, 2.0 * (apart - least) / max(speed + root, 1e-12))
             scene.until[pair] = share + free
         following = min(following, scene.until[pair])

@@ -1,21 +1,21 @@
 """Whether configurations and motions keep a scene's distances, with obstacles that stand: for planners."""
 
+from collections.abc import Callable
 from typing import Any
 
-import coal
 import numpy as np
-import pinocchio as pin
 
 from nmm.base.arrays import Array, Integers
 from nmm.base.kernels.compiled import checked_by_caller, compiled
 from nmm.base.kernels.record_layout import BLOCKS, Blocks, Memory, views
 from nmm.base.kernels.signatures import float64, int64
-from nmm.model.collisions.queries import Queries
+from nmm.model.collisions.pairs import measured_pairs, pairs_of
 from nmm.model.collisions.scene import Scene
 from nmm.model.collisions.separation import ConvexShapes
-from nmm.model.robots.joint_table import as_row
+from nmm.model.collisions.shapes import HalfSpace
 from nmm.model.robots.robot import Robot
 from nmm.plugins.planning.collisions.legs_check import MARGIN, MovedShapes, first_blocked, too_near
+from nmm.plugins.planning.collisions.own_parts import own_parts, shape_parts
 
 #: The direction that separates a pair before the first look.
 UP = (0.0, 0.0, 1.0)
@@ -42,30 +42,40 @@ class MotionCheck:
 
     def __init__(self, robot: Robot, scene: Scene | None, beside: tuple[Any, ...] = ()) -> None:
         self.scene = scene
+        self._shapes = moved_shapes(robot, scene)
+        self._measure: Callable[[Array, float], Array] | None = None
+        self.lay_out(beside)
+        self._near = checked_by_caller(_too_near, _NEAR)
+        self._blocked = checked_by_caller(first_blocked, _BLOCKED)
+
+    def lay_out(self, beside: tuple[Any, ...]) -> None:
+        """Place the shapes in new memory, with this record beside them."""
         memory = Memory()
-        memory.add(moved_shapes(robot, scene))
+        memory.add(self._shapes)
         if beside:
             memory.add(beside)
         self.blocks = memory.blocks()
         self._shapes = views(MovedShapes, *self.blocks, 0)
-        self._near = checked_by_caller(_too_near, _NEAR)
-        self._blocked = checked_by_caller(first_blocked, _BLOCKED)
 
     def keep(self, configurations: Array) -> None:
         """Keep the scene's distance, or what these (K, n) have where that is less."""
         if self.scene is None:
             return
-        queries, distances = self.scene.queries, self._shapes.kept
-        pairs = range(len(distances))
-        least = np.min([queries.distances(0.0, q, pairs) for q in configurations], axis=0)
-        distances[:] = np.clip(least - 4.0 * MARGIN, 0.0, self.scene.distance)
+        least = self._least(self.scene, configurations, self.scene.distance)
+        self.kept[:] = np.clip(least - 4.0 * MARGIN, 0.0, self.scene.distance)
 
     def widen(self, configurations: Array, margin: float) -> None:
         """Keep so much more than the scene's distance, m, or as much as these (K, n) have."""
         if self.scene is not None and margin > 0.0:
-            pairs = range(len(self.kept))
-            least = np.min([self.scene.queries.distances(0.0, q, pairs) for q in configurations], axis=0)
+            least = self._least(self.scene, configurations, self.scene.distance + margin)
             self.kept[:] = np.clip(least - 4.0 * MARGIN, self.kept, self.scene.distance + margin)
+
+    def _least(self, scene: Scene, configurations: Array, most: float) -> Array:
+        """The least distance of each pair, (P,), m; a lower bound where a pair surely keeps so much."""
+        if self._measure is None:
+            self._measure = measured_pairs(scene.robot, scene.shapes, pairs_of(scene.shapes), scene.boxes)
+        measure, enough = self._measure, most + 4.0 * MARGIN
+        return np.asarray(np.min([measure(q, enough) for q in configurations], axis=0))
 
     @property
     def kept(self) -> Array:
@@ -80,6 +90,7 @@ class MotionCheck:
     def forget(self) -> None:
         """Forget what separated pairs last, which bounds begin with."""
         self._shapes.shapes.between[:] = UP
+        self._shapes.shapes.last[:] = 0
 
     @property
     def pairs(self) -> Integers:
@@ -97,94 +108,55 @@ class MotionCheck:
 
 def moved_shapes(robot: Robot, scene: Scene | None) -> MovedShapes:
     """The record of a scene with obstacles where they are at t = 0."""
-    shapes = pin.GeometryModel() if scene is None else scene.queries.shapes
-    queries = Queries(robot, shapes, (), 0.0, 0.0) if scene is None else scene.queries
-    queries.place(0.0, robot.rest)
-    objects, old, turned = queries.shapes.geometryObjects, queries.scene, robot.joint_axes
-    own = len(objects) - (0 if scene is None else len(scene.obstacles))
-    discs = [shape.geometry.radius if isinstance(shape.geometry, coal.Cylinder) else 0.0 for shape in objects]
+    n, none = 3 + robot.n, np.zeros(0, dtype=np.int64)
+    parts, pairs = shape_parts((), none, robot.joint_axes, np.zeros((0, 7))), none.reshape(0, 2)
+    levers, stems, planes = *np.zeros((2, 0, n)), 0
+    if scene is not None:
+        own, listed = own_parts(robot, scene.meshes, scene.distance), pairs_of(scene.shapes)
+        count, objects = len(own.levers), scene.shapes.geometryObjects.tolist()
+        standing = np.zeros(len(objects) - count, dtype=np.int64)
+        parts = own.parts.beside(
+            shape_parts(objects[count:], standing, robot.joint_axes, scene.boxes[count:])
+        )
+        pairs = np.array(listed, dtype=np.int64).reshape(-1, 2)
+        levers, stems = own.levers[pairs[:, 0]], np.full((len(pairs), n), np.inf)
+        for k, pair in enumerate(listed):
+            if pair[1] < count:
+                levers[k], stems[k] = own.between[pair]
+        planes = sum(isinstance(obstacle.shape, HalfSpace) for obstacle in scene.obstacles)
+    first_corner = np.cumsum([0, *map(len, parts.corners)], dtype=np.int64)
+    corners = np.concatenate([*parts.corners, np.zeros((0, 3))])
+    degrees, neighbours = np.zeros(len(corners), dtype=np.int64), []
+    for first, edges in zip(first_corner.tolist(), parts.edges, strict=False):
+        degrees[first : first + len(edges)] = [len(ends) for ends in edges]
+        neighbours += [first + end for ends in edges for end in ends]
     convex = ConvexShapes(
-        boxes=old.boxes,
-        planes=old.planes,
-        first_corner=old.first_corner,
-        corners=old.corners,
-        rounding=old.rounding,
-        disc=np.array(discs),
-        pairs=old.pairs,
-        between=np.tile(UP, (len(old.pairs), 1)).reshape(-1, 3),
+        boxes=parts.boxes,
+        planes=np.array(len(parts.boxes) - planes, dtype=np.int64),
+        first_corner=first_corner,
+        corners=corners,
+        first_neighbour=np.cumsum([0, *degrees], dtype=np.int64),
+        neighbours=np.array(neighbours, dtype=np.int64),
+        rounding=parts.rounding,
+        disc=parts.disc,
+        pairs=pairs,
+        between=np.tile(UP, (len(pairs), 1)).reshape(-1, 3),
+        last=np.zeros(4 * len(pairs), dtype=np.int64),
     )
-    carrier = np.array(
-        [shape.parentJoint if i < own else 0 for i, shape in enumerate(objects)], dtype=np.int64
-    )
-    levers, stems = pair_levers(robot, own, carrier, objects, old.boxes, old.pairs)
     return MovedShapes(
         shapes=convex,
         joints=robot.joints,
         mimic_joints=robot.following.table.ravel(),
         planar=np.array(int(robot.platform.n_p >= 3), dtype=np.int64),
-        carrier=carrier,
-        place=np.array(
-            [as_row(turned[i].inverse() * shape.placement) for i, shape in zip(carrier, objects, strict=True)]
-        ).reshape(-1, 12),
+        carrier=parts.carrier,
+        place=parts.place,
         levers=levers,
         stems=stems,
-        kept=np.full(len(old.pairs), 0.0 if scene is None else scene.distance),
-        drift=np.zeros(len(old.pairs)),
-        until=np.zeros(len(old.pairs)),
-        places=np.zeros((len(objects), 12)),
+        kept=np.full(len(pairs), 0.0 if scene is None else scene.distance),
+        drift=np.zeros(len(pairs)),
+        until=np.zeros(len(pairs)),
+        fastest=np.zeros(len(pairs)),
+        bends=np.zeros(len(pairs)),
+        places=np.zeros((len(parts.boxes), 12)),
+        centres=np.zeros((len(parts.boxes), 3)),
     )
-
-
-def pair_levers(
-    robot: Robot, own: int, carrier: Integers, objects: Any, boxes: Array, pairs: Integers
-) -> Array:
-    """`levers` and `stems` (2, P, 3 + n) of `MovedShapes`. What a joint moves is no farther from it than the
-    lengths between joints, and the travel of sliding ones, together."""
-    model, n = robot.model, robot.n
-    lengths = np.array([float(np.linalg.norm(placement.translation)) for placement in model.jointPlacements])
-    travel = np.zeros(model.njoints)
-    for joint in range(1, model.njoints):
-        c = model.joints[joint].idx_v
-        if robot.q_units[c] == "m" and c >= robot.platform.n_p:
-            travel[joint] = float(np.abs(robot.q_limits[c]).max())
-    # How far a shape reaches from each joint's origin on its way to the root.
-    far: list[dict[int, float]] = []
-    for i in range(own):
-        reached, joint, so_far = {}, int(carrier[i]), 0.0
-        so_far = float(np.linalg.norm(objects[i].placement.act(boxes[i, :3]))) + boxes[i, 6]
-        while True:
-            reached[joint] = so_far
-            if joint == 0:
-                break
-            so_far += lengths[joint] + travel[joint]
-            joint = int(model.parents[joint])
-        far.append(reached)
-    result = np.zeros((2, len(pairs), 3 + n))
-    result[1] = np.inf
-    for k, (i, j) in enumerate(pairs):
-        for mover, other in ((i, j), (j, i)):
-            if mover >= own:
-                continue
-            for joint, lever in far[mover].items():
-                if joint == 0 or (other < own and joint in far[other]):
-                    continue
-                c, slides = 3 + model.joints[joint].idx_v, robot.q_units[model.joints[joint].idx_v] == "m"
-                result[0, k, c] = 1.0 if slides else lever
-                if other < own and not slides:
-                    shared = next(
-                        ancestor for ancestor in far[mover] if ancestor in far[other] and ancestor != joint
-                    )
-                    result[1, k, c] = far[other][shared] + _between(model, joint, shared, lengths, travel)
-    if robot.platform.n_p >= 3:
-        result[:, :, :3] = result[:, :, 3:6]
-        result[:, :, 3:6] = 0.0
-    return result
-
-
-def _between(model: pin.Model, joint: int, ancestor: int, lengths: Array, travel: Array) -> float:
-    """How far a joint's origin can be from an ancestor's, m."""
-    distance = 0.0
-    while joint != ancestor:
-        distance += float(lengths[joint] + travel[joint])
-        joint = int(model.parents[joint])
-    return distance
