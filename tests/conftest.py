@@ -40,11 +40,11 @@ QUICK = re.findall(
     r"\w+",
     """
     cli_robots collisions_distances controller controller_input controller_use
-    crossings damaged_folders errors findings findings_analysis findings_robot_file functions
+    damaged_folders errors findings findings_analysis findings_robot_file functions
     idle_inputs judging lazy_call limits limits_input linear_algebra platform_fit platform_input
-    platforms record_layout resolvers sampled samples scenario_keys scenario_spatial
-    session settling simulation skid_steer spatial_functions step_size stepping
-    strangers_robots wheeled_description wheeled_platform
+    record_layout resolvers sampled samples scenario_keys scenario_spatial
+    session settling simulation skid_steer spatial_functions stepping
+    wheeled_description wheeled_platform
     """,
 )
 #: Tests of these files that take more than a second, most of them in processes of their own.
@@ -52,11 +52,18 @@ LONGER = re.findall(
     r"\w+",
     """
     a_target_that_has_changed_since_is_not_tried an_interrupt_while_it_is_tried_is_one
-    compiled_and_from_sample_to_sample_alike damage_is_named folders_of_other_versions_keep_their_sentences
+    damage_is_named folders_of_other_versions_keep_their_sentences
     messages_are_one_line_of_at_most_300_characters nothing_is_tried_before_somebody_reads
     summary_json_has_codes_and_values who_reads_does_not_disturb_the_controller
     """,
 )
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """`pytest -m quick` imports no other files."""
+    if config.option.markexpr == "quick" and collection_path.suffix == ".py":
+        return collection_path.stem.removeprefix("test_") not in QUICK or None
+    return None
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -57,7 +57,17 @@ OTHERS = {
 }
 
 
-@pytest.mark.parametrize("name", [*bundled_robots(), *OTHERS])
+#: Robots like others of these.
+ALIKE = ("unicycle_3r", "differential_base", "ur_description/urdf/ur5_robot.urdf")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.thorough if name in ALIKE else ())
+        for name in (*bundled_robots(), *OTHERS)
+    ],
+)
 def test_it_runs_as_it_is_written(run: Command, name: str) -> None:
     frame, own_base = OTHERS.get(name, ("", True))
     trajectory = started(run, f"{DATA}{name}" if frame else name)
