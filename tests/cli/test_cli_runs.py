@@ -170,7 +170,7 @@ def test_a_run_whose_step_is_too_long_says_so(run: Command) -> None:
     assert not json.loads(Path("runs/unicycle_2r_pointing-rg/summary.json").read_text())["complete"]
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("name", ["SIGINT", pytest.param("SIGTERM", marks=pytest.mark.thorough)])
 def test_an_interrupted_run_leaves_its_part(tmp_path: Path, name: str) -> None:
     terminal = Terminal(
         tmp_path, 200, "run", "unicycle_2r_position", "--set", "duration=3000", "--out", "part"

@@ -123,7 +123,7 @@ def pages() -> Iterator[Any]:
 
 
 @pytest.mark.usefixtures("one_case")
-@pytest.mark.parametrize("page", pages())
+@pytest.mark.parametrize("page", list(pages()))
 def test_a_page_that_runs_prints_what_it_says(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
