@@ -20,6 +20,7 @@ this ran before it was built.
 from __future__ import annotations
 
 import contextlib
+import importlib
 import io
 import re
 import shlex
@@ -88,13 +89,30 @@ def _printed(command: str) -> str:
     if program == "cat":
         return "\n".join(Path(name).read_text(encoding="utf-8").strip("\n") for name in arguments)
     if program == "python":
-        done = subprocess.run(
-            [sys.executable, *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-        )
-        return done.stdout.strip("\n")
+        return _script(*arguments).strip("\n")
     if program != "nmm":
         raise ValueError(f"expected nmm, python, cat or grep -E, got {command!r}")
     return _done(arguments)[1].strip("\n")
+
+
+def _script(name: str, text: str = "") -> str:
+    """What a Python program prints, run in this process: one of its own would import everything again.
+
+    `python NAME`, and `python -c TEXT`; modules beside it are imported anew for each program.
+    """
+    code = text if name == "-c" else Path(name).read_text(encoding="utf-8")
+    here, before, printed = str(Path.cwd()), {*sys.modules}, io.StringIO()
+    sys.path.insert(0, here)
+    importlib.invalidate_caches()
+    try:
+        with contextlib.redirect_stderr(printed), contextlib.redirect_stdout(printed):
+            exec(compile(code, name, "exec"), {"__name__": "__main__"})
+    finally:
+        sys.path.remove(here)
+        for module in {*sys.modules} - before:
+            if str(getattr(sys.modules[module], "__file__", None)).startswith(here):
+                del sys.modules[module]
+    return printed.getvalue()
 
 
 def _done(arguments: list[str]) -> tuple[int, str]:

@@ -39,23 +39,45 @@ def pytest_collection_finish() -> None:
 QUICK = re.findall(
     r"\w+",
     """
-    analysis_maps cli_robots collisions_distances controller controller_input controller_use
-    crossings damaged_folders errors findings findings_analysis findings_robot_file functions
+    cli_robots collisions_distances controller controller_input controller_use
+    damaged_folders errors findings findings_analysis findings_robot_file functions
     idle_inputs judging lazy_call limits limits_input linear_algebra platform_fit platform_input
-    platforms quantities record_layout resolvers sampled samples scenario_keys scenario_spatial
-    session settling simulation skid_steer spatial_functions srdf step_size stepping storage
-    strangers_robots wall wheeled_description wheeled_platform
+    record_layout resolvers sampled samples scenario_keys scenario_spatial
+    session settling simulation skid_steer spatial_functions stepping
+    wheeled_description wheeled_platform
+    """,
+)
+#: Tests of these files that take more than a second, most of them in processes of their own.
+LONGER = re.findall(
+    r"\w+",
+    """
+    a_target_that_has_changed_since_is_not_tried an_interrupt_while_it_is_tried_is_one
+    damage_is_named folders_of_other_versions_keep_their_sentences
+    messages_are_one_line_of_at_most_300_characters nothing_is_tried_before_somebody_reads
+    summary_json_has_codes_and_values who_reads_does_not_disturb_the_controller
     """,
 )
 
 
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """`pytest -m quick` imports no other files."""
+    if config.option.markexpr == "quick" and collection_path.suffix == ".py":
+        return collection_path.stem.removeprefix("test_") not in QUICK or None
+    return None
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what `pytest -m quick` selects, and what has the fixture of a browser."""
+    """Mark what `pytest -m quick` selects, what has a browser, and what needs the site and has none."""
     for item in items:
         if item.path.stem.removeprefix("test_") in QUICK:
-            item.add_marker("quick")
-        if "browser" in getattr(item, "fixturenames", ()):
+            name = item.name.partition("[")[0].removeprefix("test_")
+            if name not in LONGER:
+                item.add_marker("quick")
+        fixtures = getattr(item, "fixturenames", ())
+        if "browser" in fixtures:
             item.add_marker("browser")
+        elif "site" in fixtures:
+            item.add_marker("thorough")
 
 
 @pytest.fixture(scope="session", autouse=True)

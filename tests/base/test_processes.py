@@ -143,7 +143,7 @@ def test_an_interrupt_that_another_thread_takes_waits_until_all_have_started(
     assert capfd.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize("after", [0.0, 0.1])
+@pytest.mark.parametrize("after", [0.0, pytest.param(0.1, marks=pytest.mark.thorough)])
 def test_ctrl_c_leaves_nothing_behind(tmp_path: Path, after: float) -> None:
     """SIGINT goes to the whole group, as a terminal sends it: while the processes start, and at work."""
     script = tmp_path / "script.py"

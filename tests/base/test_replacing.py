@@ -14,29 +14,18 @@ from pathlib import Path
 
 import pytest
 from command_line import NMM
+from whole_folders import NAMES, ours, write
 
 import nmm
 from nmm.base.errors import InputError
 from nmm.base.files import UnwrittenError, writing
 from nmm.cli.exit_status import status_of
 from nmm.views.folders import whole
-from nmm.views.folders.whole import FolderKind, check_folder, replaced_folder, steady
+from nmm.views.folders.whole import check_folder, replaced_folder, steady
 
 #: NMM_KILLS=30 kills each command so often; few do not.
 KILLS = int(os.environ.get("NMM_KILLS", "0"))
 MOST = 600.0
-NAMES = tuple("abcdefgh")
-
-
-ours = FolderKind("ours", "a")
-
-
-def write(folder: Path, number: int, pause: float = 0.0) -> None:
-    """A folder whose files all hold a number; the first one says whose it is."""
-    with replaced_folder(folder, ours) as temporary:
-        for name in NAMES:
-            (temporary / name).write_text(f'{{"format": "ours", "number": {number}}}')
-            time.sleep(pause)
 
 
 def numbers(folder: Path) -> set[str]:
@@ -46,7 +35,8 @@ def numbers(folder: Path) -> set[str]:
 WRITER = """
 import sys
 from itertools import count
-from test_replacing import Path, write
+from pathlib import Path
+from whole_folders import write
 for number in count():
     write(Path(sys.argv[1]), number, 1e-4)
     if number == 0:
@@ -218,6 +208,7 @@ def files_in(folder: Path) -> Iterator[tuple[str, bytes]]:
             yield str(path.relative_to(folder)), path.read_bytes()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", COMMANDS if KILLS else ["run"])
 def test_a_killed_command_leaves_what_was_whole(tmp_path: Path, name: str) -> None:
     """SIGKILL at random instants: the folder is the old one or a new one, and nothing hidden stays."""
@@ -226,7 +217,7 @@ def test_a_killed_command_leaves_what_was_whole(tmp_path: Path, name: str) -> No
     subprocess.run([*NMM, *COMMANDS[name]], cwd=tmp_path, check=True, capture_output=True, timeout=MOST)
     takes = time.monotonic() - began
     parts = {path for path, _ in files_in(tmp_path / "o")}
-    for _ in range(max(KILLS, 2)):
+    for _ in range(max(KILLS, 1)):
         process = subprocess.Popen(
             [*NMM, *COMMANDS[name]], cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )

@@ -44,7 +44,7 @@ def chain(
 
 ADVERSARIAL = {
     "mimics": chain("revolute", AXIS + LIMIT + f'<mimic joint="{named("joint", 0)}"/>'),
-    "continuous": chain("continuous", AXIS, count=300),
+    "continuous": chain("continuous", AXIS, count=60),
     "wheels": chain("continuous", SPIN, star=True),
     "slides": chain("prismatic", LONG, count=60),
     "meshes": chain("revolute", AXIS + LIMIT, part=shape('<mesh filename="package://p/MESH.stl"/>')),

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from killing import Commands
-from test_killed_commands import CASES, content, files, hidden
+from test_killed_commands import CASES, content, each, files, hidden
 
 import nmm
 from nmm.base.files import UnwrittenError
@@ -60,7 +60,9 @@ def line(name: str, made: str, number: int) -> str:
     return f"nmm {name}: {where}: cannot be written: {os.strerror(number)}\n"
 
 
-@pytest.mark.parametrize("name", [name for name in CASES if name not in ("sweep", "render")])
+@pytest.mark.parametrize(
+    "name", [case for case in each("run", "init") if case.values[0] not in ("sweep", "render")]
+)
 def test_a_file_that_gets_too_long(tmp_path: Path, commands: Commands, name: str) -> None:
     """What needs no disk of its own. A sweep's run is written elsewhere first; a film by another program."""
     case, folder = CASES[name], tmp_path / "here"
@@ -94,7 +96,7 @@ def test_a_disk_without_room_for_names(disk: Path, robot_2r: nmm.Robot) -> None:
         subprocess.run(["umount", "-l", str(full)], check=True)
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", each("run", "init"))
 def test_a_disk_that_gets_full(disk: Path, commands: Commands, name: str) -> None:
     rng, case, folder = random.Random(name), CASES[name], disk / name / "here"
     made = folder / case.made

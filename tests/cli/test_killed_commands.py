@@ -53,6 +53,13 @@ CASES = {
         ("render", "../run", "--video", "o.mp4", "--fps", "20"), made="o.mp4", prepared=("small_work", "film")
     ),
 }  # fmt: skip
+
+
+def each(*few: str) -> list[Any]:
+    """All cases, all but a few of them thorough: they put what they write in its place as these do."""
+    return [pytest.param(name, marks=() if name in few else pytest.mark.thorough) for name in CASES]
+
+
 #: What the last bytes are.
 ENDS = {".png": b"IEND\xaeB`\x82", ".html": b"</html>", ".parquet": b"PAR1", ".mp4": b"whole"}
 
@@ -113,7 +120,7 @@ def check_end(name: str, ended: Ended) -> None:
         assert re.fullmatch(rf"nmm {name}: ([A-Z]+ )?interrupted.*\n", ended.err), ended
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", each("run", "sweep", "init", "redundancy"))
 def test_ended_at_any_moment(tmp_path: Path, commands: Commands, name: str) -> None:
     rng, case, folder = random.Random(name), CASES[name], tmp_path / "here"
     made, resumed, refused = folder / case.made, name == "sweep", name == "init"
@@ -128,7 +135,7 @@ def test_ended_at_any_moment(tmp_path: Path, commands: Commands, name: str) -> N
     assert (first.status, first.err) == (0, "")
     whole, second = files(made), run()
     assert second.status == (2 if refused else 0)
-    signals = [signal.SIGTERM, signal.SIGINT] * max(1, KILLS) + [signal.SIGKILL] * max(3, KILLS)
+    signals = [signal.SIGTERM, signal.SIGINT] * max(1, KILLS) + [signal.SIGKILL] * max(2, KILLS)
     for k, number in enumerate(signals):
         fresh = resumed or refused or k % 2 == 0
         if fresh:

@@ -15,6 +15,7 @@ import pytest
 from page_links import Links
 from playback_browser import browser as browser
 from playwright.sync_api import Browser
+from small_pictures import draw_only
 
 from nmm.base.errors import InputError, RunError
 from nmm.base.figure_options import FigureOptions
@@ -33,10 +34,18 @@ Progress = Callable[[float], None]
 
 @pytest.fixture(scope="module")
 def paper(tmp_path_factory: pytest.TempPathFactory) -> tuple[PaperReport, list[float]]:
-    """The whole paper, once, with what it said of its progress."""
+    """The paper, once, with what it said of its progress; its own figures are drawn, the runs' are not."""
     fractions: list[float] = []
-    report = write_paper(tmp_path_factory.mktemp("out") / "paper", progress=fractions.append)
+    with pytest.MonkeyPatch.context() as patch:
+        draw_only([f"fig{number:02d}.png" for number in range(3, 11)], patch)
+        report = write_paper(tmp_path_factory.mktemp("out") / "paper", fractions.append, 1)
     return report, fractions
+
+
+@pytest.fixture(scope="module")
+def whole_paper(tmp_path_factory: pytest.TempPathFactory) -> PaperReport:
+    """As the command writes it, by several processes and with every picture."""
+    return write_paper(tmp_path_factory.mktemp("out") / "paper")
 
 
 def test_every_claim_holds(paper: tuple[PaperReport, list[float]]) -> None:
@@ -112,15 +121,14 @@ def test_progress_rises_to_the_end(paper: tuple[PaperReport, list[float]]) -> No
     assert len(fractions) > 100
 
 
-def test_page_opens_in_a_browser(paper: tuple[PaperReport, list[float]], browser: Browser) -> None:
+def test_page_opens_in_a_browser(whole_paper: PaperReport, browser: Browser) -> None:
     """All pictures load, nothing fails, and no width of window makes the page scroll sideways."""
-    report, _ = paper
     wrong: list[str] = []
     page = browser.new_page()
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on("requestfailed", lambda request: wrong.append(request.url))
     page.on("request", lambda request: request.url.startswith("file:") or wrong.append(request.url))
-    page.goto(report.index.as_uri(), wait_until="load")
+    page.goto(whole_paper.index.as_uri(), wait_until="load")
     assert page.evaluate("[...document.images].every(image => image.naturalWidth > 500)")
     for width in (1600, 1000, 390):
         page.set_viewport_size({"width": width, "height": 900})

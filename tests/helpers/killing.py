@@ -27,7 +27,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+import pytest
 from expanding import expanded_once
+from small_pictures import draw_only
 
 #: What touches files, by the name of Python's audit event; `open` counts where it is for writing.
 TOUCHING = {
@@ -174,11 +176,6 @@ def _begin(request: Request) -> None:
         os._exit(ended.code if isinstance(ended.code, int) else 0)
 
 
-def _picture(figure: Any, path: Path, **options: Any) -> None:
-    image = importlib.import_module("PIL.Image")
-    image.new("L", (8, 8)).save(path)
-
-
 def _practise(arguments: list[str]) -> None:
     """The command, once, in this process: each one forked has what it loads and compiles from the start."""
     from nmm.cli.exit_status import status_of
@@ -195,22 +192,30 @@ def _practise(arguments: list[str]) -> None:
         os.close(handle)
 
 
-def _serve() -> None:
+def _load_everything() -> None:
+    """For commands that cannot be practised here."""
     import nmm
 
     for module in pkgutil.walk_packages(nmm.__path__, "nmm."):
         importlib.import_module(module.name)
     for name in ("matplotlib.backends.backend_agg", "pyarrow.parquet"):
         importlib.import_module(name)
-    # Drawing is most of a command's time, and writes no other files than this.
-    importlib.import_module("matplotlib.figure").Figure.savefig = _picture
+
+
+def _serve() -> None:
+    everything = False
+    draw_only([], pytest.MonkeyPatch())  # it writes no other files than this
     importlib.import_module("nmm.model.robots.loading.description").expand = expanded_once
     practised: list[list[str]] = []
     for line in sys.stdin:
         request = Request(**json.loads(line))
-        if request.arguments not in practised and not request.prepared:
+        if request.prepared:
+            if not everything:
+                _load_everything()
+                everything = True
+        elif request.arguments not in practised:
             _practise(request.arguments)
-        practised.append(request.arguments)
+            practised.append(request.arguments)
         gc.freeze()  # else each forked process would look for garbage in all of it, and copy it for that
         process = os.fork()
         if not process:

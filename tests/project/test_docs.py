@@ -12,7 +12,6 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
-from dataclasses import replace
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -26,7 +25,6 @@ from small_pictures import draw_only
 from worked_examples import FILES, write_examples
 
 import nmm
-import nmm.cli.paper
 from nmm.base.bundled import bundled_scenarios
 from nmm.base.kinds import LIMITS, OBJECTIVES, PLATFORMS, REFERENCES, RESOLVERS, TASKS, Kinds
 from nmm.base.plugins import SHIPPED
@@ -100,25 +98,32 @@ def words_and_numbers(text: str) -> tuple[list[str], list[float]]:
 console = script("console")
 
 
-@pytest.fixture(scope="module")
-def paper_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """The paper's folder, which more than one page writes and none shows, is computed for the first, here:
-    other processes would draw all of it. They have tests of their own."""
-    kept, reports = tmp_path_factory.mktemp("paper") / "paper", []
+@pytest.fixture
+def one_case(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`nmm paper`, which two pages write and none shows, with its first case, in this process: all of it has
+    tests of its own."""
+    share_out = write.share_out
 
-    def write_paper(folder: str | Path, progress: Any, figures: Any) -> Any:
-        if not reports:
-            reports.append(write.write_paper(kept, progress, 1, figures=figures))
-        shutil.copytree(kept, folder)
-        return replace(reports[0], folder=Path(folder), index=Path(folder, "index.html"))
+    def shared(work: Any, items: list[int], jobs: int, advance: Any) -> Any:
+        return share_out(work, items, 1, advance)
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(nmm.cli.paper, "write_paper", write_paper)
-        yield
+    monkeypatch.setattr(write, "share_out", shared)
+    monkeypatch.setattr(write, "CASES", write.CASES[:1])
 
 
-@pytest.mark.usefixtures("paper_once")
-@pytest.mark.parametrize("page", console.PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+#: Pages that take half a minute each.
+LONG = ("which_resolver", "car", "robot_loop", "tutorials/sweeps")
+
+
+def pages() -> Iterator[Any]:
+    for page in console.PAGES:
+        name = page.relative_to(ROOT).as_posix()
+        marks = pytest.mark.thorough if name.removesuffix(".md").endswith(LONG) else ()
+        yield pytest.param(page, id=name, marks=marks)
+
+
+@pytest.mark.usefixtures("one_case")
+@pytest.mark.parametrize("page", list(pages()))
 def test_a_page_that_runs_prints_what_it_says(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -160,13 +165,21 @@ def commands(text: str) -> Iterator[list[str]]:
             yield list(takewhile(lambda it: it not in ("|", "2>&1"), shlex.split(found[1], comments=True)))
 
 
-#: What the README's commands take in the tests, to be done in seconds.
-SMALLER = {"sweep": "--samples 2 --jobs 1"}
+#: What commands take in the tests, to be done in a second.
+SMALLER = {
+    "sweep": "--samples 2 --jobs 1", "run": "--set duration=2", "compare": "--set duration=2",
+    "laps": "--laps 1",
+}  # fmt: skip
+
+
+def smaller(line: str) -> str:
+    """A command line that takes less time, unless it plans or looks at what others have written."""
+    return line if "plan" in line or "runs/" in line else f"{line} {SMALLER.get(line.split()[0], '')}"
 
 
 def test_the_commands_of_the_readme_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """All but `nmm render`, which needs a browser, and `nmm paper`, which a tutorial runs. They are listed in
-    docs/contents.md."""
+    """All but `nmm render`, which needs a browser, `nmm paper`, which a tutorial runs, and what waits for a
+    browser (`NOT_RUN`). They are listed in docs/contents.md."""
     draw_only([], monkeypatch)
     shutil.copy(ROOT / "docs" / "tutorials" / "my_robot.urdf", tmp_path)
     monkeypatch.chdir(tmp_path)
@@ -175,9 +188,9 @@ def test_the_commands_of_the_readme_run(tmp_path: Path, monkeypatch: pytest.Monk
     assert len(lines) > 15
     for line in lines:
         name = line.split()[0]
-        if name not in ("render", "paper"):
+        if name not in ("render", "paper", "view", "drive"):
             place = line.replace("runs/...", "runs/unicycle_2r_position-rg")
-            console.run(f"nmm {place} {SMALLER.get(name, '')}")
+            console.run(f"nmm {smaller(place)}")
 
 
 #: Commands on pages that are not run here, by what they hold, and why.
@@ -197,10 +210,11 @@ ELSEWHERE = {
 }
 
 
+@pytest.mark.parametrize("planning", [False, pytest.param(True, marks=pytest.mark.thorough)])
 def test_the_commands_of_the_other_pages_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    planning: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """Each once, in an empty folder."""
+    """Each once, in an empty folder; those that plan, which take long, by themselves."""
     draw_only([], monkeypatch)
     monkeypatch.chdir(tmp_path)
     lines = {
@@ -211,10 +225,11 @@ def test_the_commands_of_the_other_pages_run(
     }
     skipped = {line: [why for why in NOT_RUN if why in f"{line} "] for line in lines}
     assert {why for whys in skipped.values() for why in whys} == {*NOT_RUN}, "a reason that nothing needs"
-    run = [line for line, whys in skipped.items() if not whys]
+    run = [line for line, whys in skipped.items() if not whys and ("plan" in line) is planning]
     assert len(run) > 3
     for line in run:
-        assert status_of(shlex.split(line)) == 0, f"{lines[line]}: nmm {line}\n{capfd.readouterr().err}"
+        status = status_of(shlex.split(smaller(line)))
+        assert status == 0, f"{lines[line]}: nmm {line}\n{capfd.readouterr().err}"
 
 
 @pytest.mark.parametrize("page", DOCUMENTS)
@@ -262,7 +277,12 @@ def test_the_worked_examples_can_be_copied(tmp_path: Path, monkeypatch: pytest.M
 
 #: Tests that go over the registered kinds.
 GRIDS = [
-    "control/test_resolvers.py",
+    *(
+        f"control/test_resolvers.py::test_{name}[{shape}]"
+        for name in ("every_resolver_does_the_task", "no_resolver_calls_solved_what_is_not")
+        for shape in ((2, 4), (6, 8))
+    ),
+    "control/test_resolvers.py::test_resolvers_by_name",
     "views/test_resolver_style.py",
     "model/test_robot_grid.py::test_every_robot_tracks[unicycle-small arm-position]",
     "model/test_robot_grid.py::"
@@ -281,6 +301,7 @@ GRIDS = [
 ]
 
 
+@pytest.mark.thorough
 def test_the_worked_examples_pass_the_grids_when_they_are_registered() -> None:
     """No grid asks of a kind more than it declares, of the page's kinds and of a Jacobian transpose's."""
     plugin = ("-p", "worked_examples", "-p", "no:cacheprovider")
@@ -292,7 +313,7 @@ def test_the_worked_examples_pass_the_grids_when_they_are_registered() -> None:
         text=True,
     )
     assert found.returncode == 0, found.stdout[-4000:] + found.stderr[-1000:]
-    assert re.search(r"\b\d{3} passed", found.stdout)
+    assert re.search(r"\b[3-9]\d passed", found.stdout)
 
 
 @pytest.mark.parametrize("page", DOCUMENTS)

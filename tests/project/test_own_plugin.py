@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -105,12 +106,25 @@ def twice(x):
 """
 
 
-def install(source: Path, folder: Path) -> None:
-    """As users install a package, into a folder; what builds it is fetched where it is not installed."""
+#: Command lines, a list of arguments each, in one process: their exit statuses and what they print, as JSON.
+SEVERAL = """
+import contextlib, io, json, sys
+from nmm.cli.exit_status import status_of
+ended = []
+for arguments in json.loads(sys.argv[1]):
+    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
+        status = status_of(arguments)
+    ended.append([status, out.getvalue(), err.getvalue()])
+print(json.dumps(ended))
+"""
+
+
+def install(folder: Path, *sources: Path) -> None:
+    """As users install packages, into a folder; what builds them is fetched where it is not installed."""
     options = ["--no-build-isolation"] if find_spec("hatchling") else []
     command = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", *options, "--target", str(folder)]
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
-    done = subprocess.run([*command, str(source)], capture_output=True, text=True, env=environment)
+    done = subprocess.run([*command, *map(str, sources)], capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr
 
 
@@ -128,11 +142,19 @@ class Installed:
     def nmm(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         return self.python("-m", "nmm", *arguments)
 
+    def each(self, *lines: str) -> list[subprocess.CompletedProcess[str]]:
+        """Command lines one after the other, in one process, which says once what is wrong with a plugin."""
+        done = self.python("-c", SEVERAL, json.dumps([shlex.split(line) for line in lines]))
+        assert done.returncode == 0, done.stderr
+        first, *others = (subprocess.CompletedProcess("", *ended) for ended in json.loads(done.stdout))
+        first.stderr = done.stderr + first.stderr  # with what was said before it
+        return [first, *others]
+
 
 @pytest.fixture(scope="module")
 def patrol(tmp_path_factory: pytest.TempPathFactory) -> Installed:
     folder, at = tmp_path_factory.mktemp("installed"), tmp_path_factory.mktemp("work")
-    install(SOURCE, folder)
+    install(folder, SOURCE)
     (at / "rounds.yaml").write_text(SCENARIO, encoding="utf-8")
     return Installed(folder, at)
 
@@ -140,25 +162,25 @@ def patrol(tmp_path_factory: pytest.TempPathFactory) -> Installed:
 @pytest.fixture(scope="module")
 def faulty(tmp_path_factory: pytest.TempPathFactory) -> Installed:
     folder, at = tmp_path_factory.mktemp("faulty"), tmp_path_factory.mktemp("work")
+    sources = []
     for name, text in {"doors": DOORS, **{name: text for name, (text, _) in FAULTS.items()}}.items():
-        source = tmp_path_factory.mktemp(name)
+        sources.append(source := tmp_path_factory.mktemp(name))
         (source / "pyproject.toml").write_text(PROJECT.replace("NAME", name), encoding="utf-8")
         (source / f"{name}.py").write_text(text, encoding="utf-8")
-        install(source, folder)
+    install(folder, *sources)
     return Installed(folder, at)
 
 
 def test_commands_and_resolvers_are_in_the_help(patrol: Installed) -> None:
-    done = patrol.nmm("--help")
+    done, on_run, patrolled = patrol.each("--help", "run --help", "patrol rounds.yaml")
     commands = [
         line.split()[0] for line in done.stdout.partition("Commands:")[2].splitlines() if line.strip()
     ]
     assert commands[:4] == ["run", "patrol", "compare", "plan"]
     assert "Say when a patrol is where." in done.stdout
     assert done.stderr == ""
-    assert "dls|least_norm" in patrol.nmm("run", "--help").stdout
-    done = patrol.nmm("patrol", "rounds.yaml")
-    assert done.stdout == "4 s  [1.5, 0.5]\n8 s  [2.0, 0.5]\n"
+    assert "dls|least_norm" in on_run.stdout
+    assert patrolled.stdout == "4 s  [1.5, 0.5]\n8 s  [2.0, 0.5]\n"
 
 
 def test_its_key_is_in_the_reference(patrol: Installed) -> None:
@@ -170,28 +192,32 @@ def test_its_key_is_in_the_reference(patrol: Installed) -> None:
 
 
 def test_names_that_are_unknown_are_told_with_those_of_the_plugin(patrol: Installed) -> None:
-    done = patrol.nmm("run", "rounds.yaml", "--resolver", "least_nrm")
-    assert done.returncode == 2
-    assert "(did you mean 'least_norm'?)" in done.stderr
-    done = patrol.nmm("run", "unicycle_2r_position", "--set", "patroll=true")
-    assert done.returncode == 2
-    assert "unknown key 'patroll' (did you mean 'patrol'?)" in done.stderr
-    done = patrol.nmm("run", "rounds.yaml", "--set", "patrol.second=2")
-    assert "rounds.yaml: set patrol.second: unknown key 'second' (did you mean 'seconds'?)" in done.stderr
-    done = patrol.nmm("run", "rounds.yaml", "--set", "patrol.frame=hand")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert "rounds.yaml: set patrol.frame: robot unicycle_2r: unknown frame 'hand'" in done.stderr
+    resolver, section, key, frame = patrol.each(
+        "run rounds.yaml --resolver least_nrm",
+        "run unicycle_2r_position --set patroll=true",
+        "run rounds.yaml --set patrol.second=2",
+        "run rounds.yaml --set patrol.frame=hand",
+    )
+    assert resolver.returncode == section.returncode == 2
+    assert "(did you mean 'least_norm'?)" in resolver.stderr
+    assert "unknown key 'patroll' (did you mean 'patrol'?)" in section.stderr
+    assert "rounds.yaml: set patrol.second: unknown key 'second' (did you mean 'seconds'?)" in key.stderr
+    assert (frame.returncode, frame.stderr.count("\n")) == (2, 1)
+    assert "rounds.yaml: set patrol.frame: robot unicycle_2r: unknown frame 'hand'" in frame.stderr
 
 
 def test_its_scenario_runs_and_its_finding_is_told_and_kept(patrol: Installed) -> None:
-    done = patrol.nmm("run", "rounds.yaml", "--out", "run")
+    done, again, asked = patrol.each(
+        "run rounds.yaml --out run",
+        "run run/scenario.yaml --set duration=8 --out again",
+        "info --scenario rounds.yaml",
+    )
     assert done.returncode == 0, done.stderr
     assert done.stderr == f"warning: LEAST_NORM: {UNFINISHED}\n"
     summary = json.loads((patrol.at / "run" / "summary.json").read_text("utf-8"))
     assert [finding["code"] for finding in summary["findings"]] == ["patrol_unfinished"]
-    again = patrol.nmm("run", "run/scenario.yaml", "--set", "duration=8", "--out", "again")
     assert (again.returncode, again.stderr) == (0, "")
-    assert patrol.nmm("info", "--scenario", "rounds.yaml").returncode == 0
+    assert asked.returncode == 0
     # Without the plugin the scenario says what is missing, and the finding keeps its sentence.
     elsewhere = Installed(patrol.at, patrol.at)
     done = elsewhere.nmm("run", "run/scenario.yaml")
@@ -234,13 +260,17 @@ def test_what_of_a_plugin_fails_is_left_out(faulty: Installed) -> None:
     done = faulty.nmm("run", "unicycle_2r_position", "--set", "duration=0.1", "--out", "run")
     assert done.returncode == 0, done.stderr
     assert not [line for line in done.stderr.splitlines() if not line.startswith("plugin ")]
-    told = faulty.nmm("scenarios", "--keys").stderr
+    keys, resolver, section = faulty.each(
+        "scenarios --keys",
+        "run unicycle_2r_position --resolver hollow",
+        "run unicycle_2r_position --set hollow=true",
+    )
+    told = keys.stderr + resolver.stderr + section.stderr
     for said in ("resolver pg is nmm's already", "section plan is plugin planning's already"):
         assert f"plugin thief: {said}; this one is left out" in told
-    assert "unknown kind 'hollow'" in faulty.nmm("run", "unicycle_2r_position", "--resolver", "hollow").stderr
-    done = faulty.nmm("run", "unicycle_2r_position", "--set", "hollow=true")
-    assert done.returncode == 2
-    assert "hollow:PLUGIN is no nmm.extending.Section; it is left out" in done.stderr
+    assert "unknown kind 'hollow'" in resolver.stderr
+    assert section.returncode == 2
+    assert "hollow:PLUGIN is no nmm.extending.Section; it is left out" in told
     code = "import nmm; print(nmm.load.__module__, str(nmm.Finding('interrupted_judging'))); nmm.hollow_name"
     done = faulty.python("-c", code)
     assert done.stdout == "nmm.model.robots.loading.load interrupted while the run was judged\n"
@@ -249,13 +279,17 @@ def test_what_of_a_plugin_fails_is_left_out(faulty: Installed) -> None:
 
 def test_options_folders_and_names_of_nmm_are_added(faulty: Installed) -> None:
     """An option that a command has already is refused with its group."""
-    done = faulty.nmm("singularities", "unicycle_2r", "--task", "position", "--loud")
-    assert (done.returncode, done.stdout) == (0, "SINGULAR? unicycle_2r\n")
-    assert "plugin doors: doors:Taken: options that are there: out; it is left out" in done.stderr
-    done = faulty.nmm("singularities", "unicycle_2r", "--task", "position", "--loud", "--json")
-    assert "--json: expected without --symbolic, --search, --nearest and --loud" in done.stderr
     (faulty.at / "there").mkdir()
     (faulty.at / "there" / "survey.txt").touch()
-    done = faulty.nmm("play", "there")
-    assert (done.returncode, "got 'that of a survey'" in done.stderr) == (2, True)
+    done, both, play = faulty.each(
+        "singularities unicycle_2r --task position --loud",
+        "singularities unicycle_2r --task position --loud --json",
+        "play there",
+    )
+    assert (done.returncode, done.stdout) == (0, "SINGULAR? unicycle_2r\n")
+    assert (
+        "plugin doors: doors:Taken: options that are there: out; it is left out" in done.stderr + both.stderr
+    )
+    assert "--json: expected without --symbolic, --search, --nearest and --loud" in both.stderr
+    assert (play.returncode, "got 'that of a survey'" in play.stderr) == (2, True)
     assert faulty.python("-c", "import nmm; print(nmm.twice(2))").stdout == "4\n"

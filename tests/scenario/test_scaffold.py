@@ -57,7 +57,17 @@ OTHERS = {
 }
 
 
-@pytest.mark.parametrize("name", [*bundled_robots(), *OTHERS])
+#: Robots like others of these.
+ALIKE = ("unicycle_3r", "differential_base", "ur_description/urdf/ur5_robot.urdf")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.thorough if name in ALIKE else ())
+        for name in (*bundled_robots(), *OTHERS)
+    ],
+)
 def test_it_runs_as_it_is_written(run: Command, name: str) -> None:
     frame, own_base = OTHERS.get(name, ("", True))
     trajectory = started(run, f"{DATA}{name}" if frame else name)
@@ -93,11 +103,22 @@ WITHOUT = {
 }
 
 
-def test_every_file_of_example_robot_data_has_one_that_runs() -> None:
+#: A few, each of another kind: legs, an arm on legs, a hand, an arm, one that flies, hardly anything.
+SOME = {
+    "solo12.urdf", "anymal-kinova.urdf", "allegro_left_hand.urdf", "talos_left_arm.urdf",
+    "borinot_flying_arm_2.urdf", "double_pendulum_simple.urdf", *WITHOUT,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("some", [True, pytest.param(False, marks=pytest.mark.thorough)], ids=["some", "all"])
+def test_files_of_example_robot_data_have_one_that_runs(some: bool) -> None:
     """What loads is led along a path as its gain promises, or is refused with the reason."""
     folder = package_file(DATA + "ur_description/urdf/ur5_robot.urdf").parents[2]
     files = sorted(folder.glob("*/*/*.urdf"))
     assert len(files) > 60
+    if some:
+        files = [file for file in files if file.name in SOME]
+        assert {file.name for file in files} == SOME
     refused = {}
     for file in files:
         try:

@@ -28,7 +28,17 @@ ONE = "unicycle_2r_position"
 WHITE = 250
 
 
-@pytest.mark.parametrize(("k", "name"), list(enumerate(sorted(bundled_scenarios()))))
+#: Another robot, path or view each; the others are drawn alike.
+TIMED = ("car_parks", "tiago_pointing", "two_arms_box", ONE, "unicycle_3r_crossing")
+
+
+@pytest.mark.parametrize(
+    ("k", "name"),
+    [
+        pytest.param(k, name, marks=() if name in TIMED else pytest.mark.thorough)
+        for k, name in enumerate(sorted(bundled_scenarios()))
+    ],
+)
 def test_times_touch_nothing(k: int, name: str) -> None:
     """Where a time stands there is white below it, in wide figures and narrow ones, and it belongs to a robot
     beside it."""
@@ -68,8 +78,15 @@ def _gap(place: Place, outline: np.ndarray) -> float:
     return float(np.linalg.norm(away, axis=1).min())
 
 
-@pytest.mark.parametrize("width", [*WIDTHS.values(), 5.0])
-@pytest.mark.parametrize("name", [ONE, "unicycle_3r_crossing"])
+@pytest.mark.parametrize(
+    ("name", "width"),
+    [
+        (ONE, WIDTHS["column"]),
+        ("unicycle_3r_crossing", WIDTHS["page"]),
+        pytest.param("unicycle_3r_crossing", WIDTHS["column"], marks=pytest.mark.thorough),
+        pytest.param("unicycle_3r_crossing", 5.0, marks=pytest.mark.thorough),
+    ],
+)
 def test_figures_of_any_width_are_legible(name: str, width: float) -> None:
     trajectory = run(name)
     drawings = [
@@ -144,7 +161,8 @@ def test_run_figures_in_several_formats(tmp_path: Path) -> None:
         f"{name}.{kind}" for name in ("motion", "errors", "inputs", "objective") for kind in ("pdf", "svg")
     }
     assert {path.name for path in found} == names == {path.name for path in tmp_path.iterdir()}
-    assert not list(run(ONE).save(tmp_path / "run", figures=options).glob("*.png"))
+    saved = run(ONE).save(tmp_path / "run", figures=FigureOptions(("svg",), "column"))
+    assert {path.suffix for path in saved.iterdir()} & {".png", ".pdf", ".svg"} == {".svg"}
 
 
 @pytest.mark.parametrize(

@@ -53,8 +53,12 @@ KINDS: dict[str, Callable[[Trajectory], Figure]] = {
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", PAPER)
+#: What of the paper's other cases differs from that of the last by more than numbers.
+DIFFERENT = {PAPER[0]: ("stroboscopic", "overview"), PAPER[1]: ("stroboscopic", "errors", "overview"),
+             PAPER[2]: ("stroboscopic",), PAPER[3]: (*KINDS,)}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "kind"), [(name, kind) for name in PAPER for kind in DIFFERENT[name]])
 def test_figures_of_the_paper_are_legible(name: str, kind: str) -> None:
     check_legible(KINDS[kind](run(name)))
 
@@ -96,8 +100,8 @@ def test_figures_drawn_in_threads_are_the_same(tmp_path: Path) -> None:
         return b"".join(path.read_bytes() for path in sorted(folder.iterdir()))
 
     alone = draw("alone")
-    with ThreadPoolExecutor(3) as pool:
-        assert set(pool.map(draw, "abc")) == {alone}
+    with ThreadPoolExecutor(2) as pool:
+        assert set(pool.map(draw, "ab")) == {alone}
 
 
 def test_run_folder_gets_its_figures(tmp_path: Path) -> None:
@@ -131,8 +135,7 @@ def test_run_with_as_many_rows_as_inputs(robot_2r: Robot) -> None:
         check_legible(make(trajectory))
 
 
-@pytest.mark.parametrize("count", [1, 2, 40])
-@pytest.mark.parametrize("name", [PAPER[0], PAPER[3]])
+@pytest.mark.parametrize(("name", "count"), [(PAPER[3], 1), (PAPER[0], 2), (PAPER[3], 40)])
 def test_incomplete_runs(name: str, count: int) -> None:
     for make in KINDS.values():
         check_legible(make(cut(run(name), count)))

@@ -27,7 +27,7 @@ TWO = ("unicycle_2r_position", "unicycle_3r_out_of_reach")
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Gallery:
     """Two scenarios, one of which misses its target on purpose."""
-    return write_gallery(tmp_path_factory.mktemp("out") / "gallery", TWO)
+    return write_gallery(tmp_path_factory.mktemp("out") / "gallery", TWO, jobs=1)
 
 
 def test_each_scenario_has_picture_page_numbers_and_file(made: Gallery) -> None:
@@ -162,6 +162,7 @@ def test_there_is_no_such_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert "No such command 'gallery'" in capsys.readouterr().err
 
 
+@pytest.mark.thorough
 def test_ctrl_c_leaves_nothing(tmp_path: Path) -> None:
     """Of the script that writes it, and of the processes that share the work."""
     script = Path(gallery.__file__).parent.parent / "make_gallery.py"
