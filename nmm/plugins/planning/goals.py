@@ -49,10 +49,20 @@ class GoalPostures:
     ----------
     low, high (n,) : where starts are drawn, m and rad
     check : which keeps distances
+    within (n, 2) : their limits; the robot's when not given
     """
 
-    def __init__(self, robot: Robot, low: Array, high: Array, check: MotionCheck, tolerance: Goal) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        low: Array,
+        high: Array,
+        check: MotionCheck,
+        tolerance: Goal,
+        within: Array | None = None,
+    ) -> None:
         self.robot, self.low, self.high, self.check, self.tolerance = robot, low, high, check, tolerance
+        self.within = within
         self.tried = 0
         self.in_the_way: Counter[str] = Counter()
 
@@ -62,7 +72,7 @@ class GoalPostures:
         tries = iter(self._reaching(wanted, start, rng))
         for q in tries:
             self.tried += 1
-            if q is None or self.robot.outside(q):
+            if q is None or self.robot.outside(q, self.within):
                 continue
             pair = self.check.too_near(q)
             if pair >= 0 and self.check.scene is not None:
@@ -79,7 +89,7 @@ class GoalPostures:
     def _reaching(self, wanted: object, start: Array, rng: np.random.Generator) -> Iterator[Array | None]:
         robot = self.robot
         if isinstance(wanted, Task):
-            solve = TargetSolver(robot, wanted, self.tolerance)
+            solve = TargetSolver(robot, wanted, self.tolerance, self.within)
             yield solve(start)
             for _ in range(ATTEMPTS):
                 yield solve(rng.uniform(self.low, self.high))
@@ -94,11 +104,14 @@ class GoalPostures:
                 q[[*own]] = named[[*own]]
                 q = robot.following.placed(q)
                 yield q
-                if k == 0 and not robot.outside(q) and self.check.too_near(q) < 0:
+                if k == 0 and not robot.outside(q, self.within) and self.check.too_near(q) < 0:
                     return  # what is free stays as it is at the start, where it can
         else:
             q = robot.q(wanted)  # type: ignore[arg-type]  # which says what is wrong with it
             robot.check_limits(q)
+            outside = robot.outside(q, self.within)
+            if outside:
+                raise InputError(f"outside its limits: {few([*outside.values()])}", where="plan: goal")
             yield q
 
 
@@ -190,14 +203,17 @@ _STEPPED = int64(float64, float64[::1], int64, *BLOCKS.types)
 class TaskError:
     """A task's value, target and error along a motion, without a controller. rows : its components"""
 
-    def __init__(self, robot: Robot, task: Task, tolerance: Goal | None = None) -> None:
+    def __init__(
+        self, robot: Robot, task: Task, tolerance: Goal | None = None, within: Array | None = None
+    ) -> None:
         rows, following, tolerance = task.rows(robot), robot.following, tolerance or Goal()
         self.robot, self.rows = robot, rows
         self._program = Program(robot, (task.function, task.reference, Comparison(task)), COMPILED)
         leads = np.eye(robot.n)
         leads[following.columns] = following.multipliers[:, np.newaxis] * leads[following.leaders]
         # Angles of a platform and of joints without limits go where they like.
-        self._limits = np.where(robot.limited, robot.q_limits, [-np.inf, np.inf]).T.copy()
+        limits = np.where(robot.limited, robot.q_limits, [-np.inf, np.inf]) if within is None else within
+        self._limits = limits.T.copy()
         newton = Newton(
             units=unit_codes(rows),
             met=np.array([MET * tolerance.m, MET * tolerance.rad, 1e-4]),
@@ -227,8 +243,8 @@ class TaskError:
 class TargetSolver(TaskError):
     """Newton's method for a task whose target stands, within limits."""
 
-    def __init__(self, robot: Robot, task: Task, tolerance: Goal) -> None:
-        super().__init__(robot, task, tolerance)
+    def __init__(self, robot: Robot, task: Task, tolerance: Goal, within: Array | None = None) -> None:
+        super().__init__(robot, task, tolerance, within)
         targets = [self.evaluate(robot.rest, t)[1] for t in (0.0, 1.0, np.e)]
         if not all(np.array_equal(target, targets[0]) for target in targets):
             raise InputError("its target moves", where="plan: goal", expected="a task whose target stands")

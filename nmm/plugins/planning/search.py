@@ -25,7 +25,7 @@ from nmm.plugins.planning.goals import GoalPostures, Wanted, alternatives, nothi
 from nmm.plugins.planning.objective import SampleCosts
 from nmm.plugins.planning.path import Guide, shortened
 from nmm.plugins.planning.plan import Asked
-from nmm.plugins.planning.search_space import drawn_within, leg_speeds, pause_between, usual_speeds
+from nmm.plugins.planning.search_space import allowed, drawn_within, leg_speeds, pause_between, usual_speeds
 from nmm.plugins.planning.tree import PLACE, Trees
 from nmm.plugins.planning.ways import LEGS, ways_of
 
@@ -72,10 +72,13 @@ class PlanSearch:
         self.limits = asked.limits.on(robot)
         self.usual = usual_speeds(robot, self.limits)
         speeds, reverses = leg_speeds(robot, self.limits, self.usual), self.limits.inputs[:1, 0] < 0.0
-        ways = ways_of(
-            robot, speeds, pause_between(self.limits), bool(np.all(reverses)), self.limits.coordinates
-        )
-        self.low, self.high = drawn_within(robot, start, goals, collisions.obstacles)
+        within = self.within = allowed(robot, self.limits)
+        outside = robot.outside(start, within)
+        if outside:
+            raise InputError(f"outside its limits: {few([*outside.values()])}", where="plan: start")
+        arguments = robot, speeds, pause_between(self.limits), bool(np.all(reverses)), self.limits.coordinates
+        ways = ways_of(*arguments, within)
+        self.low, self.high = drawn_within(robot, start, goals, collisions.obstacles, within)
         trees = Trees(
             ways=ways,
             low=self.low,
@@ -90,6 +93,8 @@ class PlanSearch:
             looked=np.zeros(2, dtype=np.int64),
         )
         self.check = MotionCheck(robot, scene, trees)
+        if robot.platform.n_p >= 3:
+            self.check.stay(within[:3])
         self.trees = views(Trees, *self.check.blocks, PLACE)
         self.guide = Guide(self.check.blocks, robot.platform.n_p >= 3, robot.following.table.ravel())
         self._search = checked_by_caller(tree.search, tree.SEARCH)
@@ -155,7 +160,9 @@ class PlanSearch:
 
     def ends(self, wanted: object, start: Array) -> list[Array]:
         """Free configurations (n,) that reach a goal."""
-        postures = GoalPostures(self.robot, self.low, self.high, self.check, self.asked.tolerance)
+        postures = GoalPostures(
+            self.robot, self.low, self.high, self.check, self.asked.tolerance, self.within
+        )
         configurations = [q for goal in alternatives(wanted) for q in postures.find(goal, start, self.rng)]
         if not configurations:
             raise nothing_found(postures)

@@ -185,13 +185,22 @@ def way_time(ways: Ways, legs: Array, count: int) -> float:
     return total
 
 
-def ways_of(robot: Robot, speeds: Array, pause: float, reverses: bool, limits: Array | None = None) -> Ways:
-    """The ways of a robot's platform, and of its joints within limits (n, 2).
+def ways_of(
+    robot: Robot,
+    speeds: Array,
+    pause: float,
+    reverses: bool,
+    limits: Array | None = None,
+    within: Array | None = None,
+) -> Ways:
+    """The ways of a robot's platform, and of its joints within limits (n, 2); within (n, 2) : with its own.
 
     Raises
     ------
-    InputError : a platform whose ways are not known (wheels that steer on their own)
+    InputError : a platform whose ways are not known (wheels that steer on their own), a car that cannot steer
+        straight on
     """
+    within = robot.q_limits if within is None else within
     platform = robot.platform
     kind, radius, rolling, steering, wheelbase = STANDS, 1.0, np.zeros(3), -1, 0.0
     if platform.n_p >= 3:
@@ -214,7 +223,13 @@ def ways_of(robot: Robot, speeds: Array, pause: float, reverses: bool, limits: A
         elif platform.n_p == 4 and axle is not None and _plain(axle):
             rolling = np.array([axle.x, axle.y, axle.heading])
             steering, wheelbase = 3, axle.pivots[0].x
-            widest = min(float(np.abs(robot.q_limits[3]).min()), axle.pivots[0].widest)
+            if not within[3, 0] < 0.0 < within[3, 1]:
+                raise InputError(
+                    where=f"plan: limits: {robot.q_names[3]}",
+                    expected="[lower, upper] about 0",
+                    got=within[3],
+                )
+            widest = min(float(np.abs(within[3]).min()), axle.pivots[0].widest)
             radius = axle.least_radius(((-widest, widest),))
         else:
             raise InputError(
