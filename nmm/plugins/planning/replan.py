@@ -79,7 +79,8 @@ def replan(
     if obstacles is not None:
         asked = replace(asked, collisions=replace(asked.collisions, obstacles=tuple(obstacles)))
     if any(obstacle.moves for obstacle in asked.collisions.obstacles):
-        raise InputError("obstacles that move along a path are not replanned for", where="replan: obstacles")
+        what = "obstacles that move along a path are not replanned for"
+        raise InputError(what, where="replan: obstacles", expected="nmm.Horizon, which steps aside")
     search = PlanSearch(robot, start, [old.goal], asked, seed)
     search.begin(positive(seconds, "seconds"), progress)
     rest = _rest(plan, start, t)
