@@ -30,6 +30,8 @@ Wanted: TypeAlias = (
 )
 #: Goal configurations that are looked for, attempts to find them, and steps of Newton's method of each.
 MANY, ATTEMPTS, STEPS = 8, 200, 60
+#: So far inside limits that are asked for a task is reached where it can be, m and rad.
+INSIDE = 0.01
 #: An error is met where it is this small a share of the tolerances.
 MET = 0.2
 
@@ -86,13 +88,25 @@ class GoalPostures:
             configurations, key=lambda q: float(np.abs(self.robot.short_way(q - start)[first:]).sum())
         )
 
+    def _limits(self) -> Iterator[Array | None]:
+        """Limits to reach a task within: first a little inside those asked for, which leaves a smooth motion
+        room, then these."""
+        if self.within is not None:
+            own = np.where(self.robot.limited, self.robot.q_limits, [-np.inf, np.inf])
+            room = np.minimum(INSIDE, 0.1 * (self.within[:, 1] - self.within[:, 0]))
+            inside = self.within + np.where(self.within != own, room[:, np.newaxis] * [1.0, -1.0], 0.0)
+            if np.any(inside != self.within):
+                yield inside
+        yield self.within
+
     def _reaching(self, wanted: object, start: Array, rng: np.random.Generator) -> Iterator[Array | None]:
         robot = self.robot
         if isinstance(wanted, Task):
-            solve = TargetSolver(robot, wanted, self.tolerance, self.within)
-            yield solve(start)
-            for _ in range(ATTEMPTS):
-                yield solve(rng.uniform(self.low, self.high))
+            for within in self._limits():
+                solve = TargetSolver(robot, wanted, self.tolerance, within)
+                yield solve(start)
+                for _ in range(ATTEMPTS):
+                    yield solve(rng.uniform(self.low, self.high))
         elif isinstance(wanted, Mapping):
             named = robot.q(wanted)
             own = {robot.coordinate(name) for name in wanted if name in robot.q_names}
