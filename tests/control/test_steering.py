@@ -348,3 +348,37 @@ def test_scenarios_say_it() -> None:
     assert scenario.override("steering", False).controller().steered is None
     with refused("kinova_car.yaml: set steering.gain", got=0, kind=nmm.ScenarioError):
         scenario.override("steering", {"gain": 0}).controller()
+
+
+@pytest.mark.parametrize("ahead", [None, 0.0])
+def test_where_the_scene_is_in_the_world_decides_nothing(ahead: float | None) -> None:
+    """Robot, target and obstacle moved by one rigid motion: the same inputs near the origin and far off."""
+    robot = nmm.mount("car_base", "small_arm", at="arm_mount")
+    start = robot.q({"q2": 0.2, "q3": 1.7, "q4": 0.6, "steering": 0.2})
+    found = []
+    for x, y, turn in ((0.0, 0.0, 0.0), (5.0, 0.0, 0.0), (-40.0, 300.0, 2.0), (1.0, -3.0, -1.0)):
+        c, s = np.cos(turn), np.sin(turn)
+
+        def placed(p: list[float], x: float = x, y: float = y, c: float = c, s: float = s) -> list[float]:
+            return [c * p[0] - s * p[1] + x, s * p[0] + c * p[1] + y, *p[2:]]
+
+        place = np.eye(4)
+        place[:2, :2], place[:3, 3] = [[c, -s], [s, c]], placed([2.2, 0.3, 0.5])
+        box = nmm.Obstacle(nmm.Box([0.6, 0.4, 1.0]), place, name="box")
+        kept = nmm.Collisions(0.03, self_collisions=False, obstacles=[box])
+        q = start.copy()
+        q[:2], q[2] = placed([0.6, 0.0]), start[2] + turn
+        controller = nmm.Controller(
+            robot,
+            nmm.Task(nmm.Position("ee"), placed([4.0, 0.2, 0.8])),
+            nmm.ProjectedGradient(),
+            nmm.Clearance(kept, ahead=ahead),
+            limits=nmm.Limits(acceleration=2.0),
+            collisions=kept,
+            dt=0.02,
+        )
+        run = nmm.simulate(controller, q, 1.0, 0.02, "zoh")
+        found.append((controller.steered is None, run.u))
+    assert len({steers for steers, _ in found}) == 1
+    for _, u in found[1:]:
+        np.testing.assert_allclose(u, found[0][1], atol=1e-9)

@@ -155,6 +155,10 @@ class Renewal(LiveNumbers, ABC):
     def planned(self, t: Array) -> Array | None:
         """As of a function, with what took the place of what."""
 
+    def left(self, t: float, q: Array, roughly: bool = False) -> tuple[float, float] | None:
+        """As of a function."""
+        return None
+
     @abstractmethod
     def noticed(self, end: float) -> Iterable[Finding]:
         """What happened in a run that ended at a time, s."""
@@ -270,6 +274,11 @@ class Function(ABC):
     """
 
     comparison: Kernel | None = None
+    #: Whether limits cut each of its rows by itself, where others are cut by one share, which keeps
+    #: directions.
+    separate: ClassVar[bool] = False
+    #: Pairs, by name, that it leads nearer to each other than a controller keeps others, and how near, m.
+    nearer: Mapping[tuple[str, str], float] = MappingProxyType({})
 
     @abstractmethod
     def rows(self, robot: Robot) -> tuple[Row, ...]:
@@ -289,6 +298,16 @@ class Function(ABC):
 
     def planned(self, t: Array) -> Array | None:
         """The configurations (N, n) of the plan that it follows, at times (N,), s; None for most."""
+        return None
+
+    def dependence(self, configuration: Configuration) -> Array | None:
+        """Rows (r, n) that are not 0 where it changes with a coordinate somewhere, though not everywhere;
+        None where its derivative at any configuration says it."""
+        return None
+
+    def left(self, t: float, q: Array, roughly: bool = False) -> tuple[float, float] | None:
+        """What is left at t (s) and q (n,) to the end that it leads to, m and rad; None where that is reached
+        (`roughly`: by a robot that does not do as it is told), or where it leads to none."""
         return None
 
     def noticed(self, t: Array, q: Array) -> Iterable[Finding]:

@@ -195,7 +195,7 @@ class DistanceDamper(NamedTuple):
     """How distances are kept.
 
     first () : the first of their rows among those of the limits
-    distance () : the distance to keep, m; margin () : what rows keep beyond it, m
+    distance (P,) : the distance that each pair keeps, m; margin () : what rows keep beyond it, m
     gain () : 1/s, d falls at most at this times the room left; recovery () : speed of the return, m/s
     braking () : deceleration, m/s²; NaN for a share of the inputs' accelerations
     least (K,) : a rate that a row has to keep instead, m/s; -inf for none
@@ -203,7 +203,7 @@ class DistanceDamper(NamedTuple):
     """
 
     first: IntegerCell
-    distance: Cell
+    distance: Vector
     margin: Cell
     gain: Cell
     recovery: Cell
@@ -239,7 +239,7 @@ def clearance_bounds(
             problem.lower[row] = keep.least[k] - near.d_t[k]
             continue
         braking = counted_on(keep.braking[()], problem.limit_rows[row], LOWER, limits.falling, limits.rising)
-        room = near.d[k] - keep.distance[()]
+        room = near.d[k] - keep.distance[near.pair[k]]
         speed = keep.gain[()] * (room - keep.margin[()])  # within the margin the return may be slow
         if room < 0.0:
             speed = approach(room, dt, braking, float(keep.recovery[()]))

@@ -61,6 +61,8 @@ class Problem:
     row_scales : (s,) natural size of each row in its unit (the robot's reach for metres, 1 for radians),
         against which pivots are judged; 1 when not given
     levels : rows of each level of priority, from the highest on; one level when not given
+    separate : for each level, whether limits cut its rows one by one, so that one which they hold does not
+        hold the others; by one share λ when not given
     added_J, added_rate, added_row_scales : (k, m), (k,) and (k,), the added task of the extended Jacobian
     u_lower, u_upper : (m,) u_lower <= u <= u_upper; infinite for none
     limit_rows, lower, upper : (l, m), (l,) and (l,): lower <= limit_rows u <= upper
@@ -88,6 +90,7 @@ class Problem:
     groups: Mapping[str, tuple[str, ...]] | None = None
     row_scales: ArrayLike | None = None
     levels: Sequence[int] | None = None
+    separate: Sequence[bool] | None = None
     added_J: ArrayLike | None = None
     added_rate: ArrayLike | None = None
     added_row_scales: ArrayLike | None = None
@@ -122,6 +125,7 @@ class Problem:
             "groups": dict(self.groups or {}),
             "row_scales": _scales(self.row_scales, s, "row_scales"),
             "levels": levels,
+            "separate": _separate(self.separate, len(levels)),
             "added_J": added_J,
             "added_rate": vector(() if self.added_rate is None else self.added_rate, k, "added_rate"),
             "added_row_scales": _scales(self.added_row_scales, k, "added_row_scales"),
@@ -170,6 +174,12 @@ def _rows(value: ArrayLike, m: int, name: str) -> Array:
     rows = array(value, name)
     expect(rows.ndim == 2 and rows.shape[1] == m, name, f"{m} columns", rows)
     return rows
+
+
+def _separate(value: Sequence[bool] | None, levels: int) -> Integers:
+    separate = np.zeros(levels, dtype=np.int64) if value is None else np.array(value, dtype=np.int64)
+    expect(separate.shape == (levels,), "separate", f"{levels} of true and false, one a level", value)
+    return separate
 
 
 def _scales(value: ArrayLike | None, count: int, name: str) -> Array:

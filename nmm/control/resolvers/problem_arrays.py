@@ -26,6 +26,7 @@ class ProblemArrays(NamedTuple):
     J (s, m), rate (s,) : J u = rate, by level of priority
     row_scales (s,) : the natural size of each row, in its unit
     ends (levels,) : the row after the last of each level
+    separate (levels,) : 1 where limits cut each row of a level by itself, 0 where all by one share λ
     added_J (k, m), added_rate (k,), added_row_scales (k,) : the added task of the extended Jacobian
     h (m,) : the objective's gradient by the inputs
     u_lower, u_upper (m,) : u_lower <= u <= u_upper, infinite for none
@@ -51,6 +52,7 @@ class ProblemArrays(NamedTuple):
     rate: Vector
     row_scales: Vector
     ends: IntegerVector
+    separate: IntegerVector
     added_J: Matrix
     added_rate: Vector
     added_row_scales: Vector

@@ -1,6 +1,8 @@
 """Inputs within limits: as much of the task's rate as they allow, as near to the unlimited inputs as
 possible.
 
+A level whose rows are separate gets the inputs nearest to those wanted that keep what the levels above got.
+
 For one level of priority: the largest λ in [0, 1] with J u = r0 + λ (J u* - r0) and u within the limits, then
 the least ‖B (u - u*)‖. u* is the resolver's own answer, returned unchanged if within the limits, B its
 metric, r0 = J u_ref, with u_ref the inputs within the limits nearest to rest, or those of the levels above: λ
@@ -125,9 +127,10 @@ def enforce_limits(problem: ProblemArrays, T: Array, answer: AnswerArrays) -> No
         for i in range(end):
             change[i] = dot(JT[i], target) if i >= first else 0.0
         from_rest(problem, low, high, rest, lower, upper)
-        rows = ConstraintRows(
-            view(JT, 0, (end, m)), view(fixed, 0, (end,)), view(change, 0, (end,)), G, lower, upper, give
-        )
+        separate = level < levels and problem.separate[level] == 1
+        equal = first if separate else end  # rows whose rates are equations
+        equations = view(JT, 0, (equal, m)), view(fixed, 0, (equal,)), view(change, 0, (equal,))
+        rows = ConstraintRows(*equations, G, lower, upper, give)
         active = view(problem.active, level * (2 + c), (2 + c,))
         scale = nearest_within(rows, target, 0.0, active, difference)
         if math.isnan(scale) and level == 0:
@@ -138,14 +141,29 @@ def enforce_limits(problem: ProblemArrays, T: Array, answer: AnswerArrays) -> No
             copied(rest, u)
         else:
             move(problem, metric, rest, difference, u)
+        if separate:
+            scale = share_of_rows(problem, first, end, rest, change, u)
         for i in range(first, end):
-            wanted[i] = dot(problem.J[i], rest) + scale * change[i]
+            wanted[i] = dot(problem.J[i], u if separate else rest) + (0.0 if separate else scale * change[i])
         if level < levels and scale < 1.0 - WHOLE:
             answer.nu[level] *= scale
             answer.status[()] = RELAXED
         copied(u, rest)
         first = end
     judge(problem, wanted, answer)
+
+
+@compiled
+def share_of_rows(
+    problem: ProblemArrays, first: int, end: int, rest: Array, change: Array, u: Array
+) -> float:
+    """1 - ‖what rows from `first` to `end` miss of their change from `rest`‖ / ‖change‖, in their scales."""
+    asked, missed = 0.0, 0.0
+    for i in range(first, end):
+        weight = 1.0 / problem.row_scales[i]
+        asked += (weight * change[i]) ** 2
+        missed += (weight * (change[i] - dot(problem.J[i], u) + dot(problem.J[i], rest))) ** 2
+    return 1.0 if missed <= WHOLE * WHOLE * asked else max(0.0, 1.0 - math.sqrt(missed / asked))
 
 
 @compiled

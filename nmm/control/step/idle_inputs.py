@@ -47,13 +47,17 @@ def idle_inputs(solver: StepSolver, q0: ArrayLike | None = None) -> tuple[str, .
 
 
 def _derivatives(solver: StepSolver, q: Array) -> Sequence[Array]:
-    """J, the added task's own rows, h, and each term of changing weight, as that may be 0 at first."""
+    """J, the added task's own rows, h, each term of changing weight, as that may be 0 at first, and what
+    terms change with elsewhere (`Function.dependence`): where in the world a scene is does not matter."""
     robot, objective = solver.robot, solver.objective
     J, added_J, h = solver.derivatives
     whole = []
     for _, term in () if objective is None else objective.terms():
-        if isinstance(term, WeightedFunction):
-            configuration = Configuration(robot, q)
+        configuration = Configuration(robot, q)
+        elsewhere = (term.function if isinstance(term, WeightedFunction) else term).dependence(configuration)
+        if elsewhere is not None:
+            whole.append(elsewhere @ configuration.S)
+        elif isinstance(term, WeightedFunction):
             whole.append(evaluate(term.function, 0.0, configuration).value_q @ configuration.S)
     return J, added_J[: len(solver.added_on.rows)], h, *whole
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nmm.base.arrays import positive
+from nmm.base.arrays import Array, positive
 from nmm.base.errors import InputError, expect_kind, expect_known
 from nmm.base.kernels.record_layout import header_length, views
 from nmm.control.functions.function import Function, row_scales
@@ -103,8 +103,9 @@ class ControllerLayout(NamedTuple):
     steered: Steered | None
 
 
-def lay_out(arguments: ControllerArguments, steered: Steered | None) -> ControllerLayout:
-    """Lay out the memory of a `Controller`; `InputError` for what the robot lacks, or for too many rows."""
+def lay_out(arguments: ControllerArguments, steered: Steered | None, kept: Array) -> ControllerLayout:
+    """Lay out the memory of a `Controller`, which keeps distances `kept` (P,), m; `InputError` for what the
+    robot lacks, or for too many rows."""
     robot, task, resolver, objective, added_task, limits, *_ = arguments
     collisions = arguments.collisions
     limited = limits is not None or collisions is not None
@@ -143,6 +144,7 @@ def lay_out(arguments: ControllerArguments, steered: Steered | None) -> Controll
         groups=robot.groups,
         row_scales=row_scales(rows, robot),
         levels=tasks.levels,
+        separate=task.separate(robot),
         added_J=np.vstack([np.zeros((len(added_rows), m)), held]),
         added_rate=np.zeros(len(added_rows) + len(held)),
         added_row_scales=np.append(row_scales(added_rows, robot), np.ones(len(held))),
@@ -164,7 +166,7 @@ def lay_out(arguments: ControllerArguments, steered: Steered | None) -> Controll
     program.lay_out(
         ControlStep(
             near=near,
-            clearance=_clearance(collisions, len(limits_on.rows), len(near.d)),
+            clearance=_clearance(collisions, kept, len(limits_on.rows), len(near.d)),
             task=own,
             added=theirs,
             arm=Arm(robot.arm_coordinates, robot.following.table.ravel()),
@@ -257,11 +259,11 @@ def _first() -> SecondOrder:
     return SecondOrder(cell, cell, cell, 0, buffers, rows, rows, none, y, *(none for _ in range(5)))
 
 
-def _clearance(collisions: Collisions | None, first: int, count: int) -> DistanceDamper:
+def _clearance(collisions: Collisions | None, kept: Array, first: int, count: int) -> DistanceDamper:
     settings = Collisions() if collisions is None else collisions
     return DistanceDamper(
         first=np.array(first, dtype=np.int64),
-        distance=np.array(settings.distance),
+        distance=kept,
         margin=np.array(MARGIN),
         gain=np.array(settings.gain),
         recovery=np.array(settings.recovery),

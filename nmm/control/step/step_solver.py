@@ -102,7 +102,8 @@ class StepSolver:
         self.resolver, self.objective = resolver, given.objective
         self._whole = type(resolver).finish is Resolver.finish
         self.scene: Scene | None = None if collisions is None else collisions.on(robot)
-        laid = lay_out(given, steered)
+        kept = np.zeros(0) if self.scene is None else self.scene.keep_nearer(given.task.nearer())
+        laid = lay_out(given, steered, kept)
         self.tasks_on, self.added_on = laid.tasks, laid.added
         self.rows: tuple[Row, ...] = self.tasks_on.rows
         self.program, self.step_memory, self.dimensions = laid.program, laid.step, laid.dimensions

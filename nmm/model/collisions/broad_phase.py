@@ -29,7 +29,8 @@ class PairArrays(NamedTuple):
     active (P,) : whether a pair is near; changed (P,) : those that came near or left in the last step
     bounds (P,) : distances of near pairs, once measured, and lower bounds of the others'
     risky (P,), watched (P,) : the pairs listed for the look-ahead, and whether a pair is
-    kept (P,) : what a pair's distance may not fall below"""
+    kept (P,) : what a pair's distance may not fall below; nearer (P,) : by how much a pair may be nearer than
+    what is asked for"""
 
     band: Cell
     faces: Cell
@@ -48,6 +49,7 @@ class PairArrays(NamedTuple):
     risky: IntegerVector
     watched: IntegerVector
     kept: Vector
+    nearer: Vector
 
 
 @compiled

@@ -234,6 +234,7 @@ def _scene(
         risky=np.zeros(P, dtype=np.int64),
         watched=np.zeros(P, dtype=np.int64),
         kept=np.zeros(P),
+        nearer=np.zeros(P),
     )
 
 

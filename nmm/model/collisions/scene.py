@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -68,6 +68,13 @@ class Scene:
     def words(self, pair: int) -> str:
         """The two of a pair, for messages; "nothing" for -1."""
         return "nothing" if pair < 0 else " and ".join(self.names[pair])
+
+    def keep_nearer(self, nearer: Mapping[tuple[str, str], float]) -> Array:
+        """Let pairs by these names be as near as this, m, where that is less than the distance; returns what
+        each pair keeps, (P,)."""
+        kept = np.array([min(self.distance, nearer.get(pair, self.distance)) for pair in self.names])
+        self.queries.scene.nearer[:] = self.distance - kept
+        return kept
 
     def places(self, t: float) -> tuple[Any, ...]:
         """Pinocchio's placements of the obstacles at t, s; None for one with a path, which a record knows."""

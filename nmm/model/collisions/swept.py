@@ -255,8 +255,8 @@ def stray(scene: PairArrays, way: SweptMotion, places: Array, shape: int) -> flo
 def allow(scene: PairArrays, asked: float, target: float) -> None:
     """Set each pair's least distance: the target, or its present distance where that is less."""
     for k in range(scene.kept.shape[0]):
-        d = scene.bounds[k]
-        scene.kept[k] = target if d >= target else (d - 1e-9 if d < asked else max(asked, d - 1e-7))
+        d, aim, least = scene.bounds[k], target - scene.nearer[k], asked - scene.nearer[k]
+        scene.kept[k] = aim if d >= aim else (d - 1e-9 if d < least else max(least, d - 1e-7))
 
 
 @compiled

@@ -8,7 +8,7 @@ import numpy as np
 
 from nmm.base.findings import Finding
 from nmm.control.controller import Controller
-from nmm.control.functions.function import row_scales
+from nmm.control.functions.function import Function, Renewal, row_scales
 from nmm.control.goal import Goal, error_sizes
 from nmm.control.sequencing.sequence import Schedule
 from nmm.motion.clearance import Swept
@@ -40,7 +40,7 @@ def diagnose(leg: Leg, trajectory: Trajectory, until: Goal | None) -> Verdict | 
     held = tuple(binding(trajectory, leg.controller.solver.limits_on)) if trajectory.limited else ()
 
     def finish(verdicts: Sequence[Verdict]) -> Verdict:
-        verdict = _blocked(_reached(verdicts[0], leg, until), leg.recorder)
+        verdict = _blocked(_at_end(_reached(verdicts[0], leg, until), leg, until), leg.recorder)
         warnings = (*before, *verdict.warnings, *lines(after, verdict.outcome))
         verdict = _collided(_explained(replace(verdict, warnings=warnings)), into)
         if verdict.outcome is Outcome.MISSED:
@@ -89,7 +89,7 @@ def diagnose_legs(
             reason = Finding("nothing_to_reach", {"never": [finding.values["task"] for finding in never]})
             verdict = Verdict(Outcome.MISSED, (reason, *never))
         elif ended:
-            verdict = _reached(verdict, last, until)
+            verdict = _at_end(_reached(verdict, last, until), last, until)
         verdict = _collided(_blocked(verdict, last.recorder), into)
         every = (*leg_warnings, *verdict.warnings, *((finding,) for finding in never))
         every = tuple(line for i, line in enumerate(every) if line not in every[:i])
@@ -165,6 +165,23 @@ def _reached(verdict: Verdict, leg: Leg, goal: Goal | None) -> Verdict:
     m, rad = error_sizes(error, rows)
     reason = Finding("not_reached", {"within": recorder.duration, "m": float(m), "rad": float(rad)})
     return replace(verdict, outcome=Outcome.MISSED, reasons=(reason, *verdict.reasons))
+
+
+def _at_end(verdict: Verdict, leg: Leg, goal: Goal | None) -> Verdict:
+    """The verdict, missed where a first task leads to an end, as a plan's, that is not reached."""
+    recorder, controller = leg.recorder, leg.controller
+    if goal is not None or verdict.outcome not in DECIDED or not len(recorder):
+        return verdict
+    at_end = float(recorder.t[-1]), recorder.so_far.q[-1], recorder.disturbed
+    first = min((task.priority for task in controller.task), default=0)
+    leads: tuple[Function | Renewal, ...] = (
+        *(task.function for task in controller.task if task.priority == first),
+        *controller.solver.program.renewals,
+    )
+    for left in filter(None, (function.left(*at_end) for function in leads)):
+        reason = Finding("not_reached", {"within": recorder.duration, "m": left[0], "rad": left[1]})
+        return replace(verdict, outcome=Outcome.MISSED, reasons=(reason, *verdict.reasons))
+    return verdict
 
 
 def _blocked(verdict: Verdict, recorder: Recorder) -> Verdict:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from itertools import pairwise
+from types import MappingProxyType
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +19,7 @@ from nmm.base.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.base.kernels.signatures import float64, int64
 from nmm.control.functions.function import Function, Renewal, Row, Shown, Stage
 from nmm.control.goal import Goal, error_sizes, norms, unit_codes
+from nmm.model.robots.frame_path import FramePath
 from nmm.model.robots.reach import first_tip
 from nmm.model.robots.robot import Robot
 
@@ -26,6 +29,8 @@ KNOT = 0.02
 HEADER = 1
 #: A table that is renewed has room for so many times the plan's knots, and for so many s at least.
 ROOM, ROOM_FOR = 4, 120.0
+#: How near to its end a plan is reached.
+END = Goal(m=0.005, rad=0.02)
 #: After another plan was made, or none was found, the next is made so much later at the earliest, s.
 WAIT = 1.0
 
@@ -128,7 +133,10 @@ class FromPlan(Function):
     length : the way along which a platform comes back from beside it, about, m
     tube : how far from the plan is worth a finding
     anew : what follows another plan, from q (n,); then a run that is outside the tube goes on with it
+    nearer : pairs, by name, that the plan leads nearer to each other than what it keeps, and how near, m
     """
+
+    separate: ClassVar[bool] = True
 
     def __init__(
         self,
@@ -139,8 +147,9 @@ class FromPlan(Function):
         length: float,
         tube: Goal,
         anew: Callable[[Array], FromPlan] | None = None,
+        nearer: Mapping[tuple[str, str], float] = MappingProxyType({}),
     ) -> None:
-        self.robot, self.at, self.tube, self.anew = robot, at, tube, anew
+        self.robot, self.at, self.tube, self.anew, self.nearer = robot, at, tube, anew, nearer
         parts = [np.linspace(a, b, 1 + math.ceil((b - a) / KNOT))[:-1] for a, b in pairwise(stops)]
         times = np.concatenate([*parts, [stops[-1], stops[-1] + KNOT]])
         q, u = at(times)
@@ -182,6 +191,22 @@ class FromPlan(Function):
 
     def planned(self, t: Array) -> Array:
         return self.at(np.clip(t, 0.0, self.duration))[0]
+
+    def left(self, t: float, q: Array, roughly: bool = False) -> tuple[float, float] | None:
+        """What is left to the plan's end, unless another took its place (`Renewed.left`): of the coordinates
+        and, in m, of the end-effector."""
+        return None if self.anew is not None else self.to_end(q, roughly)
+
+    def to_end(self, q: Array, roughly: bool) -> tuple[float, float] | None:
+        """What is left at q (n,) to the plan's end, m and rad, where it is more than `END` or, roughly, the
+        tube."""
+        m, rad = self.apart([self.duration], [q])[0].tolist()
+        tip, within = first_tip(self.robot), self.tube if roughly else END
+        if tip is not None:
+            (end,) = self.planned(np.array([self.duration]))
+            reached, there = FramePath(self.robot, tip).positions(np.array([q, end]))
+            m = max(m, float(np.linalg.norm(reached - there)))
+        return None if m <= within.m and rad <= within.rad else (m, rad)
 
     def noticed(self, t: Array, q: Array) -> Iterator[Finding]:
         """Where a run left the plan, unless another took its place (`Renewed.noticed`)."""
@@ -258,6 +283,9 @@ class Renewed(Renewal):
         for since, function in self._plans:
             configurations[t >= since] = function.planned(t[t >= since] - since)
         return configurations
+
+    def left(self, t: float, q: Array, roughly: bool = False) -> tuple[float, float] | None:
+        return self._plans[-1][1].to_end(q, roughly)
 
     def noticed(self, end: float) -> Iterator[Finding]:
         if self._made:

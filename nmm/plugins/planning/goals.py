@@ -32,6 +32,8 @@ Wanted: TypeAlias = (
 )
 #: Goal configurations that are looked for, attempts to find them, and steps of Newton's method of each.
 MANY, ATTEMPTS, STEPS = 8, 200, 60
+#: So far inside limits that are asked for a task is reached where it can be, m and rad.
+INSIDE = 0.01
 #: An error is met where it is this small a share of the tolerances.
 MET = 0.2
 
@@ -51,11 +53,22 @@ class GoalPostures:
     ----------
     low, high (n,) : where starts are drawn, m and rad
     check : which keeps distances
+    within (n, 2) : their limits; the robot's when not given
     """
 
-    def __init__(self, robot: Robot, low: Array, high: Array, check: MotionCheck, tolerance: Goal) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        low: Array,
+        high: Array,
+        check: MotionCheck,
+        tolerance: Goal,
+        within: Array | None = None,
+    ) -> None:
         self.robot, self.low, self.high, self.check, self.tolerance = robot, low, high, check, tolerance
-        ends = np.ascontiguousarray(robot.q_limits.T) + np.array([[-SLACK], [SLACK]])
+        self.within = within
+        limits = robot.q_limits if within is None else within
+        ends = np.ascontiguousarray(limits.T) + np.array([[-SLACK], [SLACK]])
         ends[:, robot.following.columns] = [[-np.inf], [np.inf]]  # their leaders' limits are theirs, too
         self._ends = ends
         self.tried = 0
@@ -103,11 +116,23 @@ class GoalPostures:
         """How far q (n,) is from the nearest of others, in the coordinate that differs most, m or rad."""
         return float(np.abs(self.robot.short_way(q - np.array(others))).max(axis=1).min())
 
+    def _limits(self) -> Iterator[Array | None]:
+        """Limits to reach a task within: first a little inside those asked for, which leaves a smooth motion
+        room, then these."""
+        if self.within is not None:
+            own = np.where(self.robot.limited, self.robot.q_limits, [-np.inf, np.inf])
+            room = np.minimum(INSIDE, 0.1 * (self.within[:, 1] - self.within[:, 0]))
+            inside = self.within + np.where(self.within != own, room[:, np.newaxis] * [1.0, -1.0], 0.0)
+            if np.any(inside != self.within):
+                yield inside
+        yield self.within
+
     def _reaching(self, wanted: object, start: Array, rng: np.random.Generator) -> Iterator[Array | None]:
         robot = self.robot
         if isinstance(wanted, Task):
-            starts = np.vstack([start, rng.uniform(self.low, self.high, (ATTEMPTS, robot.n))])
-            yield from self._tried(TargetSolver(robot, wanted, self.tolerance), starts)
+            for within in self._limits():
+                starts = np.vstack([start, rng.uniform(self.low, self.high, (ATTEMPTS, robot.n))])
+                yield from self._tried(TargetSolver(robot, wanted, self.tolerance, within), starts)
         elif isinstance(wanted, Mapping):
             named = robot.q(wanted)
             own = {robot.coordinate(name) for name in wanted if name in robot.q_names}
@@ -119,11 +144,14 @@ class GoalPostures:
                 q[[*own]] = named[[*own]]
                 q = robot.following.placed(q)
                 yield q
-                if k == 0 and not robot.outside(q) and self.check.too_near(q) < 0:
+                if k == 0 and not robot.outside(q, self.within) and self.check.too_near(q) < 0:
                     return  # what is free stays as it is at the start, where it can
         else:
             q = robot.q(wanted)  # type: ignore[arg-type]  # which says what is wrong with it
             robot.check_limits(q)
+            outside = robot.outside(q, self.within)
+            if outside:
+                raise InputError(f"outside its limits: {few([*outside.values()])}", where="plan: goal")
             yield q
 
 
@@ -261,12 +289,16 @@ _TRY_STARTS = int64(*(*BLOCKS.types, *BLOCKS.types, float64[:, ::1], int64, floa
 class TaskError:
     """A task's value, target and error along a motion, without a controller. rows : its components"""
 
-    def __init__(self, robot: Robot, task: Task, tolerance: Goal | None = None) -> None:
+    def __init__(
+        self, robot: Robot, task: Task, tolerance: Goal | None = None, within: Array | None = None
+    ) -> None:
         rows, following, tolerance = task.rows(robot), robot.following, tolerance or Goal()
         self.robot, self.rows = robot, rows
         self._program = Program(robot, (task.function, task.reference, Comparison(task)), COMPILED)
         leads = np.eye(robot.n)
         leads[following.columns] = following.multipliers[:, np.newaxis] * leads[following.leaders]
+        # Angles of a platform and of joints without limits go where they like.
+        limits = np.where(robot.limited, robot.q_limits, [-np.inf, np.inf]) if within is None else within
         newton = Newton(
             units=unit_codes(rows),
             met=np.array([MET * tolerance.m, MET * tolerance.rad, 1e-4]),
@@ -274,8 +306,7 @@ class TaskError:
                 [row.angular and task.function.comparison is None for row in rows], dtype=np.int64
             ),
             compared=np.array(int(task.function.comparison is not None), dtype=np.int64),
-            # Angles of a platform and of joints without limits go where they like.
-            limits=np.where(robot.limited, robot.q_limits, [-np.inf, np.inf]).T.copy(),
+            limits=limits.T.copy(),
             mimic_joints=following.table.ravel(),
             leads=leads,
             error=np.zeros(len(rows)),
@@ -297,8 +328,8 @@ class TaskError:
 class TargetSolver(TaskError):
     """Newton's method for a task whose target stands, within limits."""
 
-    def __init__(self, robot: Robot, task: Task, tolerance: Goal) -> None:
-        super().__init__(robot, task, tolerance)
+    def __init__(self, robot: Robot, task: Task, tolerance: Goal, within: Array | None = None) -> None:
+        super().__init__(robot, task, tolerance, within)
         self.calls_python, self.blocks = self._program.calls_python, self._program.blocks
         self.try_starts = checked_by_caller(try_starts, _TRY_STARTS)
         targets = [self.evaluate(robot.rest, t)[1] for t in (0.0, 1.0, np.e)]

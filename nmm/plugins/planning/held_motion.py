@@ -20,6 +20,7 @@ from nmm.plugins.planning.holding import ARRIVED, FollowedPath, Held
 from nmm.plugins.planning.path import Guide
 from nmm.plugins.planning.problem import TURN
 from nmm.plugins.planning.samples import MotionSamples, SampledMotion
+from nmm.plugins.planning.search_space import allowed
 from nmm.plugins.planning.timing import inputs_of_legs, spins_of
 
 #: The steps by which the arm follows, s, and its joints', rad or m, halved until what is held is off by no
@@ -123,7 +124,8 @@ class HeldTiming:
         begin = motion.samples.begin[::2]
         t = begin[:-1, np.newaxis] + np.diff(begin)[:, np.newaxis] * BETWEEN
         q, _ = motion.at(t.ravel())
-        if any(self.robot.outside(row) or max(self.held.off(row)) > KEPT for row in q):
+        within = allowed(self.robot, self.limits)
+        if any(self.robot.outside(row, within) or max(self.held.off(row)) > KEPT for row in q):
             return False
         straight = nodes[:-1, np.newaxis] + gone[:, :, np.newaxis] * np.diff(nodes, axis=0)[:, np.newaxis]
         first = self.held.platform

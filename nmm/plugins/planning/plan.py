@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
@@ -46,13 +46,14 @@ class TimedMotion(Protocol):
 
 
 class Found(NamedTuple):
-    """What a search leaves to a plan: its motion, its goal, the trees that were grown, (E, 2, n), and what
-    another search is made with."""
+    """What a search leaves to a plan: its motion, its goal, the trees that were grown, (E, 2, n), what
+    another search is made with, and pairs by name that come nearer than what is kept, how near, m."""
 
     motion: TimedMotion
     goal: Wanted
     tree: Array
     prepared: Prepared
+    nearer: Mapping[tuple[str, str], float]
 
     @property
     def limits(self) -> LimitsOn:
@@ -139,7 +140,10 @@ class Plan:
 
         Limits, distances and priorities hold for it as for any task. Below other tasks it keeps the robot
         near the plan's posture with the inputs that they leave. Where the controller keeps distances, the
-        plan should keep 0.05 m more: near an obstacle a controller goes slower than a plan.
+        plan should keep 0.05 m more: near an obstacle a controller goes slower than a plan. Limits cut each
+        input by itself: one that is held, as a car's steering at its stop, does not hold the others. A pair
+        that begins near may be as near as the plan has it. A run that does not end within 5 mm and 0.02 rad
+        of the plan's end is missed. To step aside from what moves is for `Horizon`.
 
         Parameters
         ----------
@@ -188,7 +192,7 @@ class Plan:
             return other._followed(gain, length, pace, tube, replan)
 
         arguments = self.robot, at, self.stops / share, gain, length, tube
-        return FromPlan(*arguments, None if replan is None else anew)
+        return FromPlan(*arguments, None if replan is None else anew, self.found.nearer)
 
     def trajectory(self, dt: float = 0.02) -> Trajectory:
         """The motion sampled every dt, s, and at its end, as a run: it plays, saves and compares. Its task is

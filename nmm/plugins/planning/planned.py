@@ -83,7 +83,8 @@ def _waited(search: PlanSearch, path: TimedLegs, movers: Scene) -> TimedLegs:
     if timing is None:
         names = few(sorted({obstacle.name for obstacle in movers.obstacles}))
         tried = f"{ways} way{'s'[: ways > 1]} and {looked} timings of their parts looked at"
-        raise RunError(f"{tried}: none keeps its distance of {names}", where="plan")
+        what = f"{tried}: none keeps its distance of {names}"
+        raise RunError(what, where="plan", expected="nmm.Horizon, which steps aside")
     return timing
 
 
@@ -186,5 +187,5 @@ def _found(search: PlanSearch, motion: TimedMotion) -> Plan:
 
 
 def _plan(search: PlanSearch, motion: TimedMotion, motions: int, postures: int) -> Plan:
-    result = Found(motion, search.goals[-1], search.tree, search.prepared)
+    result = Found(motion, search.goals[-1], search.tree, search.prepared, search.check.nearer)
     return Plan(search.robot, motions, postures, result)

@@ -22,7 +22,7 @@ from nmm.plugins.planning.collisions.motion_check import MotionCheck
 from nmm.plugins.planning.effort import efforts_of
 from nmm.plugins.planning.objective import SampleCosts
 from nmm.plugins.planning.path import Guide
-from nmm.plugins.planning.search_space import leg_speeds, pause_between, usual_speeds
+from nmm.plugins.planning.search_space import allowed, leg_speeds, pause_between, usual_speeds
 from nmm.plugins.planning.tree import PLACE, Trees
 from nmm.plugins.planning.ways import ways_of
 
@@ -73,7 +73,9 @@ class Prepared:
         self.usual = usual_speeds(robot, self.limits)
         speeds, reverses = leg_speeds(robot, self.limits, self.usual), self.limits.inputs[:1, 0] < 0.0
         pause = pause_between(self.limits)
-        self._ways = ways_of(robot, speeds, pause, bool(np.all(reverses)), self.limits.coordinates)
+        self.within = allowed(robot, self.limits)
+        arguments = robot, speeds, pause, bool(np.all(reverses)), self.limits.coordinates
+        self._ways = ways_of(*arguments, self.within)
         self._place(asked)
 
     def among(self, obstacles: Sequence[Obstacle]) -> Prepared:
@@ -102,7 +104,10 @@ class Prepared:
             stands = [obstacle for obstacle in collisions.obstacles if not obstacle.moves]
             own = own and collisions.self_collisions
             scene = replace(collisions, obstacles=stands).on(robot) if stands or own else None
-        self._lay_out(MotionCheck(robot, scene, self._trees(ROOM)))
+        check = MotionCheck(robot, scene, self._trees(ROOM))
+        if robot.platform.n_p >= 3:
+            check.stay(self.within[:3])
+        self._lay_out(check)
 
     def _trees(self, room: int) -> Trees:
         n = self.robot.n

@@ -78,7 +78,8 @@ def replan(
     if obstacles is None:
         obstacles = old.asked.collisions.obstacles
     if any(obstacle.moves for obstacle in obstacles):
-        raise InputError("obstacles that move along a path are not replanned for", where="replan: obstacles")
+        what = "obstacles that move along a path are not replanned for"
+        raise InputError(what, where="replan: obstacles", expected="nmm.Horizon, which steps aside")
     prepared = old.prepared.among(obstacles)
     with prepared.lock:
         search = PlanSearch(prepared, start, [old.goal], seed)

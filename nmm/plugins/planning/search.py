@@ -49,7 +49,13 @@ class PlanSearch:
         self.seed = seed = counted(seed, "seed", 0)
         self.tree = np.zeros((0, 2, self.robot.n))
         self.rng = np.random.default_rng(seed)
-        self.low, self.high = drawn_within(self.robot, start, goals, self.asked.collisions.obstacles)
+        self.within = prepared.within
+        outside = self.robot.outside(start, self.within)
+        if outside:
+            raise InputError(f"outside its limits: {few([*outside.values()])}", where="plan: start")
+        self.low, self.high = drawn_within(
+            self.robot, start, goals, self.asked.collisions.obstacles, self.within
+        )
         trees = self.trees
         trees.low[:], trees.high[:] = self.low, self.high
         trees.random[:] = 1 + seed % (tree.MODULUS - 1)
@@ -122,7 +128,9 @@ class PlanSearch:
 
     def ends(self, wanted: object, start: Array) -> list[Array]:
         """Free configurations (n,) that reach a goal."""
-        postures = GoalPostures(self.robot, self.low, self.high, self.check, self.asked.tolerance)
+        postures = GoalPostures(
+            self.robot, self.low, self.high, self.check, self.asked.tolerance, self.within
+        )
         configurations = [q for goal in alternatives(wanted) for q in postures.find(goal, start, self.rng)]
         if not configurations:
             raise nothing_found(postures)

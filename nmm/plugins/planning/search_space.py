@@ -53,12 +53,18 @@ def pause_between(limits: LimitsOn) -> float:
     return float(np.clip(USUAL / finite.min(), PAUSE, 2.0)) if len(finite) else PAUSE
 
 
+def allowed(robot: Robot, limits: LimitsOn) -> Array:
+    """Where coordinates may be, (n, 2): within the robot's limits and those asked for; infinite for none."""
+    own, asked = np.where(robot.limited, robot.q_limits, [-np.inf, np.inf]), limits.coordinates
+    return np.column_stack([np.maximum(own[:, 0], asked[:, 0]), np.minimum(own[:, 1], asked[:, 1])])
+
+
 def drawn_within(
-    robot: Robot, start: Array, goals: Sequence[Wanted], obstacles: Sequence[Obstacle]
+    robot: Robot, start: Array, goals: Sequence[Wanted], obstacles: Sequence[Obstacle], within: Array
 ) -> tuple[Array, Array]:
-    """Where configurations are drawn, (n,) each: joints within limits, the platform around all that is
+    """Where configurations are drawn, (n,) each: joints within limits (n, 2), the platform around all that is
     known."""
-    low, high = np.where(robot.limited, robot.q_limits, [-np.pi, np.pi]).T.copy()
+    low, high = np.where(np.isfinite(within), within, [-np.pi, np.pi]).T.copy()
     # What goes round and starts far from 0 is drawn all round.
     far_round = robot.continuous & (np.abs(start) > 0.5 * np.pi)
     low = np.where(far_round, start - np.pi, np.maximum(low, start - np.pi))
@@ -82,4 +88,4 @@ def drawn_within(
         around = AROUND + 2.0 * robot.reach
         low[:2], high[:2] = np.min(points, axis=0) - around, np.max(points, axis=0) + around
         low[2], high[2] = -np.pi, np.pi
-    return low, high
+    return np.maximum(low, within[:, 0]), np.minimum(high, within[:, 1])

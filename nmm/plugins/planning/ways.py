@@ -186,14 +186,24 @@ def way_time(ways: Ways, legs: Array, count: int) -> float:
     return total
 
 
-def ways_of(robot: Robot, speeds: Array, pause: float, reverses: bool, limits: Array | None = None) -> Ways:
-    """The ways of a robot's platform, and of its joints within limits (n, 2).
+def ways_of(
+    robot: Robot,
+    speeds: Array,
+    pause: float,
+    reverses: bool,
+    limits: Array | None = None,
+    within: Array | None = None,
+) -> Ways:
+    """The ways of a robot's platform, and of its joints within limits (n, 2); within (n, 2) : with its own.
 
     Raises
     ------
-    InputError : a platform whose ways are not known (wheels that steer on their own)
+    InputError : a platform whose ways are not known (wheels that steer on their own), a car that cannot steer
+        straight on
     """
-    kind, radius, rolling, steering, wheelbase = _of_platform(robot, reverses)
+    steers = robot.q_limits if within is None else within
+    widest = tuple(steers[3].tolist()) if robot.platform.n_p == 4 else (0.0, 0.0)
+    kind, radius, rolling, steering, wheelbase = _of_platform(robot, reverses, *widest)
     return Ways(
         kind=np.array(kind, dtype=np.int64),
         radius=np.array(radius),
@@ -208,8 +218,11 @@ def ways_of(robot: Robot, speeds: Array, pause: float, reverses: bool, limits: A
 
 
 @lru_cache(maxsize=8)
-def _of_platform(robot: Robot, reverses: bool) -> tuple[int, float, Array, int, float]:
-    """Kind, radius, rolling, steering and wheelbase of a robot's `Ways`."""
+def _of_platform(
+    robot: Robot, reverses: bool, right: float, left: float
+) -> tuple[int, float, Array, int, float]:
+    """Kind, radius, rolling, steering and wheelbase of a robot's `Ways`; a car's steering angle is within
+    [right, left], rad."""
     platform = robot.platform
     kind, radius, rolling, steering, wheelbase = STANDS, 1.0, np.zeros(3), -1, 0.0
     if platform.n_p >= 3:
@@ -232,7 +245,13 @@ def _of_platform(robot: Robot, reverses: bool) -> tuple[int, float, Array, int, 
         elif platform.n_p == 4 and axle is not None and _plain(axle):
             rolling = np.array([axle.x, axle.y, axle.heading])
             steering, wheelbase = 3, axle.pivots[0].x
-            widest = min(float(np.abs(robot.q_limits[3]).min()), axle.pivots[0].widest)
+            if not right < 0.0 < left:
+                raise InputError(
+                    where=f"plan: limits: {robot.q_names[3]}",
+                    expected="[lower, upper] about 0",
+                    got=[right, left],
+                )
+            widest = min(min(-right, left), axle.pivots[0].widest)
             radius = axle.least_radius(((-widest, widest),))
         else:
             raise InputError(

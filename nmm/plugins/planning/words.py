@@ -16,6 +16,8 @@ PARTS = 5
 LEFT, STRAIGHT, RIGHT = 1.0, 0.0, -1.0
 #: Parts this short, in radii, are none: a length that should be 0 is not refused for its sign.
 SHORT = 1e-10
+#: Words whose lengths differ by less are equally long, in radii; so are sums of roots.
+ALIKE, ROOTS = 1e-9, 1e-6
 #: A turn that is so little short of a whole one is none: two arcs that touch leave roots of rounding in a
 #: line between.
 NONE = 1e-7
@@ -33,12 +35,16 @@ def take(
     word: Array, best: Array, way: tuple[float, float], turns: tuple[float, ...], parts: tuple[float, ...]
 ) -> None:
     """Make a word the best one where it is the shortest so far. way: the signs of time and of turning in
-    which it was found; best () : its length; word (5, 2) : turn and length of its parts."""
-    total = 0.0
+    which it was found; best (2,) : its length, and the sum of the roots of its parts'; word (5, 2) : turn and
+    length of its parts.
+
+    Of words that are equally long the one whose parts are less alike is the best, from either of its ends."""
+    total, roots = 0.0, 0.0
     for part in parts:
         total += abs(part)
-    if total < best[0] - SHORT:
-        best[0] = total
+        roots += math.sqrt(abs(part))
+    if total < best[0] - ALIKE or (total <= best[0] + ALIKE and roots < best[1] - ROOTS):
+        best[0], best[1] = total, roots
         for i in range(PARTS):
             word[i, 0] = turns[i] * way[1]
             word[i, 1] = parts[i] * way[0]
@@ -146,8 +152,8 @@ def either_way(
 @compiled
 def reeds_shepp(x: float, y: float, phi: float, word: Array) -> float:
     """Write the shortest word to (x, y, phi), forwards and backwards, and return its length."""
-    best = scratch(1)
-    best[0] = math.inf
+    best = scratch(2)
+    best[0] = best[1] = math.inf
     for time in (1.0, -1.0):
         for turn in (1.0, -1.0):
             a, b, c = time * x, turn * y, wrapped(time * turn * phi)
@@ -171,8 +177,8 @@ def turned(angle: float) -> float:
 @compiled
 def dubins(x: float, y: float, phi: float, word: Array) -> float:
     """Write the shortest word to (x, y, phi) that goes forwards, and return its length."""
-    best = scratch(1)
-    best[0] = math.inf
+    best = scratch(2)
+    best[0] = best[1] = math.inf
     for turn in (1.0, -1.0):
         b, c, way = turn * y, turn * phi, (1.0, turn)
         xi, eta = x - math.sin(c), b - 1.0 + math.cos(c)

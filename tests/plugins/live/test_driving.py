@@ -407,6 +407,37 @@ def test_a_plan_is_sent_to_pages_once_and_taken_away() -> None:
         assert gone["tree"] is None
 
 
+@pytest.mark.parametrize("name", ["behind_the_wall", "unicycle_3r_position"])
+def test_a_plan_to_where_the_robot_is_is_followed_and_shown(name: str) -> None:
+    """Of no length, or nearly: the loop goes on."""
+    with Loop(scenario(name)) as loop:
+        driven = loop.session._driven
+        here = json.dumps(ee(driven)[: len(driven.targets[0].signal.value)].tolist())
+        loop.session.receive(f'{{"type":"aim","task":0,"value":{here}}}')
+        loop.session.receive('{"type":"order","what":"plan"}')
+        found: list[dict] = []
+
+        def shown() -> bool:
+            found.extend(json.loads(line) for line in loop.latest().splitlines())
+            return any(one["type"] == "plan" for one in found)
+
+        wait_for(shown)
+        wait_for(lambda: "plan's end" in str(loop.picture()["told"]))
+
+
+def test_what_goes_wrong_with_a_plan_is_told_and_the_loop_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    def raises(*_: object) -> dict[str, object]:
+        raise ValueError("drawn wrongly")
+
+    monkeypatch.setattr(Planning, "shown", raises)
+    with Loop(scenario("behind_the_wall")) as loop:
+        loop.session.receive('{"type":"order","what":"plan"}')
+        wait_for(lambda: "drawn wrongly" in str(loop.picture()["told"]))
+        before = loop.picture()["t"]
+        wait_for(lambda: loop.picture()["t"] != before)
+        assert loop.picture()["plans"] is False
+
+
 # the loop
 
 

@@ -11,8 +11,8 @@ from nmm.motion import compiled_loop
 
 LIMITS = nmm.Limits(velocity={"platform": 1.0, "arm": 1.5}, acceleration={"platform": 1.0, "arm": 3.0})
 WALL = nmm.Obstacle(nmm.Box([0.2, 4.0, 2.0]), [3.0, 0.0, 0.5], name="wall")
-#: Where the robot is pushed, from its start: before the wall, and turned.
-PUSHED = (2.0, 1.0, 3.1)
+#: Where the robot is pushed, from its start: behind the wall, close to it, and turned towards it.
+PUSHED = (3.6, 0.0, 3.1)
 
 
 @cache

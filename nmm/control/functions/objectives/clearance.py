@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any, Protocol, Self, cast
 
 import numpy as np
 
@@ -119,6 +119,18 @@ class Clearance(Objective):
             )
             self._setting.queries.scene.faces[()] = -np.inf  # one row a pair: H is of distances
         return (stage(1, robot.n, _Near(self._setting, self.reach, self.ahead)),)
+
+    def dependence(self, configuration: Configuration) -> Array:
+        """What moves one shape of a pair and not the other, and what steers where it looks ahead: near or
+        not."""
+        self.stages(configuration.robot)
+        scene = cast(Scene, self._setting)
+        rows = np.asarray(scene.queries.scene.apart.max(axis=0, initial=0.0))[np.newaxis]
+        roll = RollingPreview(configuration.robot)
+        if self.ahead or (self.ahead is None and roll.rolls):
+            _, derivative = roll(configuration.q, self.ahead or AHEAD)
+            rows[:, : len(derivative)] += rows[:, : len(derivative)] @ derivative
+        return rows
 
 
 class _Near:

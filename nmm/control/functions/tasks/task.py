@@ -177,6 +177,21 @@ class Stack:
         """How many rows each level of priority has, the first level first."""
         return self.on(robot).levels
 
+    def separate(self, robot: Robot) -> tuple[bool, ...]:
+        """For each level of priority, whether limits cut its rows one by one: all its functions say so."""
+        separate: dict[int, bool] = {}
+        for task in self.tasks:
+            separate[task.priority] = separate.get(task.priority, True) and task.function.separate
+        return tuple(separate.values())
+
+    def nearer(self) -> dict[tuple[str, str], float]:
+        """Pairs, by name, that a task leads nearer to each other than what is kept, and how near, m."""
+        pairs: dict[tuple[str, str], float] = {}
+        for task in self.tasks:
+            for names, least in task.function.nearer.items():
+                pairs[names] = min(least, pairs.get(names, least))
+        return pairs
+
     def place(self, priority: int | None) -> int:
         """The number, from 1 on, of the first level that is not above a priority; 0 for None, above all."""
         if priority is None:

@@ -41,6 +41,9 @@ FARTHEST = Goal(m=0.1, rad=0.2)
 NOTHING = Task(Constant([0.0]), [0.0], gain=None)
 COLOR = (0.85, 0.45, 0.0)
 
+#: The command that draws no plan.
+NO_PLAN: Command = {"type": "plan", "lines": [], "tree": None, "ghosts": None}
+
 T = TypeVar("T")
 
 
@@ -160,11 +163,11 @@ class Planning:
         """The command that draws the plan: the ways of the task's frame and of the platform, the trees that
         were grown, of the platform or else of the frame, and copies."""
         lines: list[Any] = []
-        command: Command = {"type": "plan", "lines": lines, "tree": None, "ghosts": None}
+        command: Command = NO_PLAN | {"lines": lines}
         if self._followed is None:
             return command
         plan, frame = self._followed.plan, self._driven.targets[self._task].frame
-        robot, t = plan.robot, np.linspace(0.0, plan.duration, POINTS)
+        robot, t = plan.robot, np.linspace(0.0, plan.duration, POINTS if plan.duration > 0.0 else 1)
         q, u = plan(t)
         motion = Motion(robot, t, q, u, frame=frame)
         floor = on_floor(q) if robot.platform.n_p else None

@@ -22,7 +22,7 @@ from nmm.model.robots.motion import Camera
 from nmm.motion.components import Axes
 from nmm.motion.seen import SeenPoints
 from nmm.plugins.live.driving.driven import Driven, DrivenState, PendingController
-from nmm.plugins.live.driving.planning import Planning, later, why
+from nmm.plugins.live.driving.planning import NO_PLAN, Planning, later, why
 from nmm.plugins.live.driving.setups import Choice, DriveSetup, named
 from nmm.plugins.live.server import Visitor
 from nmm.plugins.live.session import FPS, RobotSession
@@ -293,10 +293,15 @@ class DriveSession(RobotSession):
             key = next(iter(self._picks))
             value = self._picks.pop(key)
             self._making = later(lambda: _made(self._driven, key, value))
-        self._planning.attend()
-        if self._plan[0] != self._planning.number:
-            line = encode(self._planning.shown(self._drawn, self.shown.now[1]))
-            self._plan = self._planning.number, line
+        try:
+            self._planning.attend()
+            if self._plan[0] != self._planning.number:
+                line = encode(self._planning.shown(self._drawn, self.shown.now[1]))
+                self._plan = self._planning.number, line
+        except Exception as error:  # what goes wrong with a plan ends the plan, not the loop
+            self._planning.turn(False)
+            self._plan = self._planning.number, encode(NO_PLAN)
+            self._notice, self._until = why(error), time.monotonic() + NOTICE
 
     def _publish(self, look: DrivenState) -> None:
         driven = self._driven

@@ -26,6 +26,8 @@ from nmm.model.collisions.separation import ConvexShapes, extreme, separation
 MARGIN = 5e-4
 #: A turn this small along a leg is none, rad.
 STRAIGHT = 1e-9
+#: A platform is beyond where it stays by more than this, m and rad.
+STAYS = 1e-9
 
 
 class MovedShapes(NamedTuple):
@@ -37,7 +39,7 @@ class MovedShapes(NamedTuple):
     levers (P, 3 + n) : how far a unit of each number of a leg can move the two of a pair to each other, m
     stems (P, 3 + n) : of a joint between two of the robot's shapes, how far from it the shape that it does
         not move can reach, m; else infinite
-    kept (P,) : distances to keep, m
+    kept (P,) : distances to keep, m; stays (3, 2) : where a platform's x, y and theta stay, m and rad
     drift (P,) : how far the obstacle of a pair moves at most during the motion that is looked at, m
     until (P,), fastest (P,), bends (P,) : while a leg is looked at, how much of it is surely free; `approach`
         and, once it was asked for, `bend`
@@ -53,6 +55,7 @@ class MovedShapes(NamedTuple):
     levers: Matrix
     stems: Matrix
     kept: Vector
+    stays: Matrix
     drift: Vector
     until: Vector
     fastest: Vector
@@ -281,12 +284,45 @@ def leg_blocked(scene: MovedShapes, q: Array, leg: Array) -> int:
 
 
 @compiled
+def leaves(scene: MovedShapes, q: Array, leg: Array) -> bool:
+    """Whether the platform leaves where it stays on a leg from q: at its end, or where an arc's x or y turns
+    round."""
+    point = scratch(q.shape[0])
+    for axis in range(3):
+        low, high = scene.stays[axis, 0] - STAYS, scene.stays[axis, 1] + STAYS
+        if math.isinf(low) and math.isinf(high):
+            continue
+        along(1, q, leg, 1.0, scratch(0), point)
+        if not low <= point[axis] <= high:
+            return True
+        if axis == 2 or abs(leg[2]) <= STRAIGHT:
+            continue
+        # x turns round where the velocity, along q[2] + turn + atan2(leg[1], leg[0]), is across it.
+        across = (0.5 * math.pi if axis == 0 else 0.0) - q[2] - math.atan2(leg[1], leg[0])
+        begin, end = min(0.0, leg[2]), max(0.0, leg[2])
+        turn = across - math.pi * math.floor((across - begin) / math.pi)
+        while turn < end:
+            along(1, q, leg, turn / leg[2], scratch(0), point)
+            if not low <= point[axis] <= high:
+                return True
+            turn += math.pi
+    return False
+
+
+@compiled
 def first_blocked(integers: Integers, floats: Array, q: Array, legs: Array, count: int, end: Array) -> int:
-    """The first pair that is too near on the first `count` of legs (L, 3 + n) from q, or -1; end (n,): where
-    they lead."""
+    """The first pair that is too near on the first `count` of legs (L, 3 + n) from q, their number where the
+    platform leaves where it stays, or -1; end (n,): where they lead."""
     scene = views(MovedShapes, integers, floats, 0)
     current = scratch(q.shape[0])
     copied(q, end)
+    if scene.planar[()] == 1:
+        for i in range(count):
+            if leaves(scene, end, legs[i]):
+                return scene.kept.shape[0]
+            along(1, end, legs[i], 1.0, scene.mimic_joints, current)
+            copied(current, end)
+        copied(q, end)
     for i in range(count):  # most motions that are blocked are so at the middle or the end of a leg, too
         for share in (0.5, 1.0):
             along(scene.planar[()], end, legs[i], share, scene.mimic_joints, current)

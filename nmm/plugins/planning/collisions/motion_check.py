@@ -57,6 +57,10 @@ class MotionCheck:
         self.blocks = memory.blocks()
         self._shapes = views(MovedShapes, *self.blocks, 0)
 
+    def stay(self, limits: Array) -> None:
+        """Keep a platform's x, y and theta within limits (3, 2), m and rad, on legs."""
+        self._shapes.stays[:] = limits
+
     def keep(self, configurations: Array) -> None:
         """Keep the scene's distance, or what these (K, n) have where that is less."""
         if self.scene is None:
@@ -81,6 +85,16 @@ class MotionCheck:
     def kept(self) -> Array:
         """The distance that each pair keeps, (P,), m."""
         return self._shapes.kept
+
+    @property
+    def nearer(self) -> dict[tuple[str, str], float]:
+        """Pairs, by name, that keep less than the scene's distance, and how near they may come, m."""
+        pairs: dict[tuple[str, str], float] = {}
+        if self.scene is not None:
+            for names, kept in zip(self.scene.names, self.kept.tolist(), strict=True):
+                if kept < self.scene.distance:
+                    pairs[names] = min(kept - MARGIN, pairs.get(names, np.inf))
+        return pairs
 
     @property
     def levers(self) -> Array:
@@ -153,6 +167,7 @@ def moved_shapes(robot: Robot, scene: Scene | None) -> MovedShapes:
         levers=levers,
         stems=stems,
         kept=np.full(len(pairs), 0.0 if scene is None else scene.distance),
+        stays=np.tile([-np.inf, np.inf], (3, 1)),
         drift=np.zeros(len(pairs)),
         until=np.zeros(len(pairs)),
         fastest=np.zeros(len(pairs)),
