@@ -15,6 +15,7 @@ from nmm.base.errors import InputError, RobotError, few
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.collisions.pairs import always_near, link_names, named_pairs, own_shapes, pairs_of, touching
 from nmm.model.collisions.queries import Queries
+from nmm.model.collisions.sensed.elements import Elements
 from nmm.model.collisions.shapes import HalfSpace
 from nmm.model.robots.loading.srdf import read_srdf
 from nmm.model.robots.loading.srdf_fitting import disabled_pairs
@@ -97,6 +98,9 @@ def set_up(
     known: list[tuple[str, ...]] = [
         (shape.name, link) for shape, link in zip(shapes.geometryObjects, links, strict=True)
     ]
+    for obstacle in obstacles:
+        if isinstance(obstacle.shape, Elements):
+            raise InputError("no distances to what was sensed yet", where=f"obstacle {obstacle.name}")
     clash = sorted({obstacle.name for obstacle in obstacles} & {name for names in known for name in names})
     if clash:
         raise InputError(f"{clash[0]} is a link or shape of the robot", where="collisions: obstacles")
