@@ -22,7 +22,7 @@ class Cells(NamedTuple):
 
     corner (3,), cell (3,) : the least corner of all cells, and a cell's edges, m
     starts (nx ny nz + 1,) : the first element of each cell, z fastest
-    centres (N, 3), halves (N, 3) or (0, 3) : the elements by cells, m; without halves they are points
+    centres (N, 3), halves (N, 3), (1, 3) of all, or (0, 3) : the elements by cells, m; without halves points
     field (nx, ny, nz) : no point of a cell is nearer to a point of an element, m; `INSIDE` inside
     """
 
@@ -66,8 +66,10 @@ def sorted_cells(
     field = far_field(full, edge)
     if inside is not None and len(inside):
         field[within] = INSIDE
-    boxes = np.zeros((0, 3)) if halves is None else np.ascontiguousarray(halves[order])
-    return Cells(corner, edge, starts, np.ascontiguousarray(centres[order]), boxes, field)
+    boxes = np.zeros((0, 3))
+    if halves is not None:
+        boxes = halves[:1].copy() if halves.strides[0] == 0 else halves[order]
+    return Cells(corner, edge, starts, centres[order], boxes, field)
 
 
 def _numbers(points: Array, corner: Array, cell: Array, counts: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -95,7 +97,8 @@ def far_field(full: Flags, cell: Array) -> NDArray[np.float32]:
         grown[ahead] |= before[behind]
         grown[behind] |= before[ahead]
     # In three axes of which the last has one cell it takes thirty times as long as in two.
-    wide = [axis for axis in range(3) if full.shape[axis] > 1] or [0]
+    wide = [axis for axis in range(3) if full.shape[axis] > 1]
+    wide += [axis for axis in range(3) if axis not in wide][: max(0, 2 - len(wide))]
     free = np.ascontiguousarray(~grown).reshape([full.shape[axis] for axis in wide])
     apart = edt.edt(free, anisotropy=tuple(cell[wide].tolist()), black_border=False, parallel=1)
     field = np.ascontiguousarray(apart, dtype=np.float32).reshape(full.shape)

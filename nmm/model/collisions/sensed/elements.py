@@ -48,8 +48,7 @@ class Elements(Shape):
         self.radius = scalar(radius, "elements: radius", least=0.0)
         self.halves: Array | None = None
         if halves is not None:
-            wide = np.broadcast_to(array(halves, "elements: halves"), self.centres.shape)
-            self.halves = unwritable(np.ascontiguousarray(wide))
+            self.halves = np.broadcast_to(array(halves, "elements: halves"), self.centres.shape)
         edges = array(cell, "elements: cell")
         self.cell = np.array([positive(edge, "elements: cell") for edge in np.broadcast_to(edges, 3)])
         least = self.centres.min(axis=0)
@@ -110,8 +109,6 @@ def surface(full: Flags) -> Flags:
     padded = np.pad(full, 1)
     inner = padded[1:-1, 1:-1, 1:-1].copy()
     for axis in range(3):
-        if full.shape[axis] == 1:  # cells as high as the world
-            continue
         for shift in (-1, 1):
             inner &= np.roll(padded, shift, axis)[1:-1, 1:-1, 1:-1]
     return full & ~inner

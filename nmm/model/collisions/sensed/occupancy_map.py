@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from nmm.base.arrays import Flags, counted, positive, vector
 from nmm.base.errors import expect, expect_known
 from nmm.model.collisions.obstacle import Obstacle
-from nmm.model.collisions.sensed.elements import Elements, surface
+from nmm.model.collisions.sensed.elements import Elements
 from nmm.model.collisions.sensed.map_files import read_map
 
 OCCUPIED, FREE = "occupied", "free"
@@ -93,9 +93,7 @@ class OccupancyMap(Obstacle):
         full = self.full.T[:, :, np.newaxis]
         expect(full.any(), f"{where}: cells", f"an occupied cell (from {self.lethal} on)")
         edge = np.array([self.resolution, self.resolution, self.height])
-        outer = surface(full)
-        centres, inside = ((np.argwhere(which) + 0.5) * edge for which in (outer, full & ~outer))
-        return Elements(centres, 0.5 * edge, 0.0, edge, np.zeros(3), inside)
+        return Elements((np.argwhere(full) + 0.5) * edge, 0.5 * edge, 0.0, edge, np.zeros(3))
 
     @classmethod
     def load(

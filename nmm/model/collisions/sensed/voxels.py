@@ -126,7 +126,7 @@ def _octree(path: Path) -> tuple[Flags, float, Array]:
 
 
 class ElevationMap(Obstacle):
-    """Heights of the ground as an obstacle: all below them.
+    """Heights of the ground as an obstacle: all below them, down to a cell below the lowest.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ class ElevationMap(Obstacle):
         level = np.arange(int(tops.max()))
         full = level < tops[:, :, np.newaxis]
         # A cell as high as the lowest neighbour's topmost, which may be lower than its cell, is seen.
-        outer = full & (level >= np.minimum(beside, tops)[:, :, np.newaxis] - 1)
+        outer = full & ((level >= np.minimum(beside, tops)[:, :, np.newaxis] - 1) | (level == 0))
         corner = np.append(self.origin[:2], self.origin[2] + low)
         index = np.argwhere(outer)
         centres, halves = corner + (index + 0.5) * edge, np.full((len(index), 3), 0.5 * edge)
