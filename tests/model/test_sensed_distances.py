@@ -16,13 +16,13 @@ from nmm.base.arrays import Array
 from nmm.base.kernels.compiled import checked_by_caller, compiled
 from nmm.base.kernels.record_layout import BLOCKS, Blocks, Memory, views
 from nmm.base.kernels.signatures import float64, void
+from nmm.model.collisions.elements.boxes import Elements
+from nmm.model.collisions.elements.cells import far_field
+from nmm.model.collisions.elements.nearest import cell_bound, measure_sensed, sensed_bound
+from nmm.model.collisions.elements.shapes_record import SensedShapes, covering, sensed_shapes
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.collisions.pairs import query_shapes
-from nmm.model.collisions.sensed.cells import far_field
-from nmm.model.collisions.sensed.elements import Elements
-from nmm.model.collisions.sensed.nearest import cell_bound, measure_sensed, sensed_bound
 from nmm.model.collisions.sensed.self_filter import point_distances
-from nmm.model.collisions.sensed.shapes_record import SensedShapes, covering, sensed_shapes
 from nmm.model.collisions.shapes import hull
 from nmm.model.robots.joint_table import as_row
 

@@ -19,8 +19,8 @@ from places import UR5
 
 import nmm
 from nmm.base.errors import InputError
+from nmm.model.collisions.elements.boxes import surface
 from nmm.model.collisions.pairs import query_shapes
-from nmm.model.collisions.sensed.elements import surface
 from nmm.model.collisions.sensed.map_files import read_image
 
 

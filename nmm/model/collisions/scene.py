@@ -12,10 +12,10 @@ import pinocchio as pin
 
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError, RobotError, few
+from nmm.model.collisions.elements.boxes import Elements
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.collisions.pairs import always_near, link_names, named_pairs, own_shapes, pairs_of, touching
 from nmm.model.collisions.queries import Queries
-from nmm.model.collisions.sensed.elements import Elements
 from nmm.model.collisions.shapes import HalfSpace
 from nmm.model.robots.loading.srdf import read_srdf
 from nmm.model.robots.loading.srdf_fitting import disabled_pairs
@@ -98,9 +98,6 @@ def set_up(
     known: list[tuple[str, ...]] = [
         (shape.name, link) for shape, link in zip(shapes.geometryObjects, links, strict=True)
     ]
-    for obstacle in obstacles:
-        if isinstance(obstacle.shape, Elements):
-            raise InputError("no distances to what was sensed yet", where=f"obstacle {obstacle.name}")
     clash = sorted({obstacle.name for obstacle in obstacles} & {name for names in known for name in names})
     if clash:
         raise InputError(f"{clash[0]} is a link or shape of the robot", where="collisions: obstacles")
@@ -132,7 +129,10 @@ def set_up(
         left_out |= matches
     wanted = [pair for pair in wanted if pair not in left_out]
     always = [pair for pair in wanted if pair in own_near]
-    always += always_near(robot, shapes, [pair for pair in wanted if pair[1] >= count], distance)
+    # Pairs with what was sensed are in none of them: Coal knows a box around it.
+    seen = {j for j, obstacle in enumerate(sorted_obstacles, count) if isinstance(obstacle.shape, Elements)}
+    others = [pair for pair in wanted if pair[1] >= count and pair[1] not in seen]
+    always += always_near(robot, shapes, others, distance)
     if always:
         near = list(dict.fromkeys(name(pair) for pair in always))
         notes.append(

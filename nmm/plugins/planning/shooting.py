@@ -162,7 +162,7 @@ def write_constraints(scene: MovedShapes, joints: Array, twists: Array, x: Shoot
     for pair in range(P):
         r = 2 * w + pair
         asked = scene.kept[pair] + min(x.room[pair], x.margin[k])
-        apart = placed_bound(scene, pair, asked + NEAR)
+        apart = placed_bound(scene, pair, asked + NEAR, asked + NEAR)
         x.c[k, B + r] = math.inf
         if apart < asked + NEAR:
             x.c[k, B + r] = apart - asked

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from nmm.base.arrays import Flags, counted, positive, vector
 from nmm.base.errors import expect, expect_known
+from nmm.model.collisions.elements.boxes import Elements
 from nmm.model.collisions.obstacle import Obstacle
-from nmm.model.collisions.sensed.elements import Elements
 from nmm.model.collisions.sensed.map_files import read_map
 
 OCCUPIED, FREE = "occupied", "free"

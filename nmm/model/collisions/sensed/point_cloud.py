@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, matrix, positive, scalar, vector
 from nmm.base.errors import InputError, expect
+from nmm.model.collisions.elements.boxes import CELL, Elements
 from nmm.model.collisions.obstacle import Obstacle, Placement
 from nmm.model.collisions.sensed.cloud_files import points_of_file
-from nmm.model.collisions.sensed.elements import CELL, Elements
 
 if TYPE_CHECKING:
     from nmm.model.robots.robot import Robot

@@ -13,8 +13,8 @@ from nmm.base.arrays import Array, Flags, positive, vector
 from nmm.base.errors import InputError, expect
 from nmm.base.files import read_bytes
 from nmm.base.text_format import one_line
+from nmm.model.collisions.elements.boxes import Elements, surface
 from nmm.model.collisions.obstacle import Obstacle, Placement
-from nmm.model.collisions.sensed.elements import Elements, surface
 
 #: No map has more cells, no file more bytes.
 MOST, LONGEST = 200_000_000, 2_000_000_000

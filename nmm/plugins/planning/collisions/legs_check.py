@@ -19,6 +19,8 @@ from nmm.base.kernels.kinematics import Joints, axes, compose, moved, place_join
 from nmm.base.kernels.linear_algebra import copied, dot, norm
 from nmm.base.kernels.record_layout import IntegerCell, IntegerVector, Matrix, Vector, views
 from nmm.base.kernels.velocity_map import place_mimic_joints
+from nmm.model.collisions.elements.nearest import sensed_bound
+from nmm.model.collisions.elements.shapes_record import SensedShapes
 from nmm.model.collisions.separation import ConvexShapes, extreme, separation
 
 #: Pairs within this beyond their distance count as too near, m: else motions along a wall take looks without
@@ -39,6 +41,7 @@ class MovedShapes(NamedTuple):
         not move can reach, m; else infinite
     kept (P,) : distances to keep, m
     drift (P,) : how far the obstacle of a pair moves at most during the motion that is looked at, m
+    sensed : obstacles that were sensed
     until (P,), places (G, 12) : while a leg is looked at, how much of it is surely free; where shapes are
     """
 
@@ -54,6 +57,7 @@ class MovedShapes(NamedTuple):
     drift: Vector
     until: Vector
     places: Matrix
+    sensed: SensedShapes
 
 
 @compiled
@@ -80,8 +84,9 @@ def place_shape(scene: MovedShapes, joints: Array, shape: int) -> None:
 
 
 @compiled
-def placed_bound(scene: MovedShapes, pair: int, enough: float) -> float:
-    """A lower bound of the distance of a pair where its shapes were placed; rough above `enough`."""
+def placed_bound(scene: MovedShapes, pair: int, enough: float, least: float) -> float:
+    """A lower bound of the distance of a pair where its shapes were placed; rough above `enough`, and from
+    what was sensed above `least`, too."""
     shapes, places = scene.shapes, scene.places
     i, j = shapes.pairs[pair, 0], shapes.pairs[pair, 1]
     if j < shapes.planes[()]:
@@ -95,15 +100,17 @@ def placed_bound(scene: MovedShapes, pair: int, enough: float) -> float:
         apart = math.sqrt(square) - shapes.boxes[i, 6] - shapes.boxes[j, 6]
         if apart >= enough:
             return apart
+    if scene.sensed.row[j] >= 0:
+        return sensed_bound(scene.sensed, places, i, j, enough, least, shapes.between[pair])
     return separation(shapes, places, pair, enough)
 
 
 @compiled
-def pair_bound(scene: MovedShapes, joints: Array, pair: int, enough: float) -> float:
+def pair_bound(scene: MovedShapes, joints: Array, pair: int, enough: float, least: float) -> float:
     """`placed_bound` where the joints (J, 12) are."""
     place_shape(scene, joints, scene.shapes.pairs[pair, 0])
     place_shape(scene, joints, scene.shapes.pairs[pair, 1])
-    return placed_bound(scene, pair, enough)
+    return placed_bound(scene, pair, enough, least)
 
 
 @compiled
@@ -145,7 +152,7 @@ def too_near(scene: MovedShapes, q: Array) -> int:
     place_joints(scene.joints, q, joints)
     for pair in range(scene.kept.shape[0]):
         least = scene.kept[pair] + MARGIN
-        if pair_bound(scene, joints, pair, least) < least:
+        if pair_bound(scene, joints, pair, least, least) < least:
             return pair
     return -1
 
@@ -235,11 +242,14 @@ def look(scene: MovedShapes, q: Array, leg: Array, share: float, joints: Array, 
         if scene.until[pair] <= share:
             least = scene.kept[pair]
             fastest = approach(scene, pair, leg, math.inf)
-            apart = pair_bound(scene, joints, pair, least + MARGIN + fastest * (1.0 - share))
+            enough = least + MARGIN + fastest * (1.0 - share)
+            apart = pair_bound(scene, joints, pair, enough, least + MARGIN)
             if apart < least + MARGIN:
                 return -1.0 - pair
             free = (apart - least) / approach(scene, pair, leg, apart)
-            if steady == 1 and share + free < 1.0:
+            # The second is of convex shapes: of points that were sensed each has a direction of its own.
+            convex = scene.sensed.row[scene.shapes.pairs[pair, 1]] < 0
+            if steady == 1 and convex and share + free < 1.0:
                 speed = speed_towards(scene, q, leg, joints, twists, pair)
                 root = math.sqrt(speed * speed + 2.0 * (apart - least) * bend(scene, pair, leg))
                 free = max(free, 2.0 * (apart - least) / max(speed + root, 1e-12))

@@ -132,6 +132,7 @@ def moved_shapes(robot: Robot, scene: Scene | None) -> MovedShapes:
         drift=np.zeros(len(old.pairs)),
         until=np.zeros(len(old.pairs)),
         places=np.zeros((len(objects), 12)),
+        sensed=old.sensed,
     )
 
 

@@ -11,8 +11,8 @@ import math
 from nmm.base.arrays import Array
 from nmm.base.kernels.compiled import compiled, scratch
 from nmm.base.kernels.pointers import doubles_at, short_integers_at, singles_at
-from nmm.model.collisions.sensed.element_distance import box_distance, point_distance
-from nmm.model.collisions.sensed.shapes_record import HULL, SensedShapes
+from nmm.model.collisions.elements.element_distance import box_distance, point_distance
+from nmm.model.collisions.elements.shapes_record import HULL, SensedShapes
 
 #: Elements are looked for so much farther than the larger of the field's bound and the distance asked for, m.
 REACH = 0.12
@@ -165,6 +165,21 @@ def near_distance(
 
 
 @compiled
+def placed_sensed(
+    shapes: SensedShapes, row: int, pose: Array, i: int, enough: float, least: float, out: Array
+) -> float:
+    """`sensed_bound` of a shape placed at pose (12,) in the axes of a row's elements; out (6,) as of
+    `near_distance`."""
+    bound = far_bound(shapes, row, pose, i)
+    if bound >= enough:
+        return bound
+    if is_inside(shapes, row, pose, i):
+        return -shapes.lattice[row, 3]
+    d = near_distance(shapes, row, pose, i, min(enough, max(bound, least) + REACH), ROUGH, out)
+    return max(d, bound) if d > 0.0 else d
+
+
+@compiled
 def sensed_bound(
     shapes: SensedShapes, places: Array, i: int, j: int, enough: float, least: float, direction: Array
 ) -> float:
@@ -173,30 +188,21 @@ def sensed_bound(
 
     direction (3,) : from the nearest element to the shape, world axes; unchanged where none is near
     """
-    row = shapes.row[j]
     pose, out = scratch(12), scratch(6)
     into_axes(places, j, i, pose)
-    bound = far_bound(shapes, row, pose, i)
-    if bound >= enough:
-        return bound
-    if is_inside(shapes, row, pose, i):
-        return -shapes.lattice[row, 3]
-    reach = min(enough, max(bound, least) + REACH)
-    d = near_distance(shapes, row, pose, i, reach, ROUGH, out)
-    if d < reach:
-        square = out[0] * out[0] + out[1] * out[1] + out[2] * out[2]
-        if square > 0.5:
-            for k in range(3):
-                direction[k] = -(
-                    places[j, k] * out[0] + places[j, 3 + k] * out[1] + places[j, 6 + k] * out[2]
-                )
-    return max(d, bound) if d > 0.0 else d
+    for k in range(6):
+        out[k] = 0.0
+    bound = placed_sensed(shapes, shapes.row[j], pose, i, enough, least, out)
+    if out[0] * out[0] + out[1] * out[1] + out[2] * out[2] > 0.5:
+        for k in range(3):
+            direction[k] = -(places[j, k] * out[0] + places[j, 3 + k] * out[1] + places[j, 6 + k] * out[2])
+    return bound
 
 
 @compiled
 def measure_sensed(shapes: SensedShapes, places: Array, i: int, j: int, reach: float, result: Array) -> None:
     """result (10,): distance of a robot's shape i to a sensed obstacle j, normal from the first to the second
-    and the nearest points of both, world axes; where none is within reach a lower bound, and zeros."""
+    and the nearest points of both, world axes; where none is within reach a lower bound, and no points."""
     row = shapes.row[j]
     pose, out = scratch(12), scratch(6)
     into_axes(places, j, i, pose)
@@ -220,4 +226,5 @@ def measure_sensed(shapes: SensedShapes, places: Array, i: int, j: int, reach: f
             result[1 + k] = n
             result[4 + k], result[7 + k] = p - n * (d + radius), p - n * radius
         else:
-            result[1 + k] = result[4 + k] = result[7 + k] = 0.0
+            result[1 + k] = 0.0
+            result[4 + k] = result[7 + k] = places[i, 9 + k]

@@ -11,7 +11,7 @@ import numpy as np
 from nmm.base.arrays import Array
 from nmm.base.kernels.pointers import address_of
 from nmm.base.kernels.record_layout import IntegerMatrix, IntegerVector, Matrix
-from nmm.model.collisions.sensed.elements import Elements
+from nmm.model.collisions.elements.boxes import Elements
 
 #: Kinds of the robot's shapes: boxes; spheres and capsules; cylinders; hulls of points.
 BOX, ROUND, DISC, HULL = 0, 1, 2, 3

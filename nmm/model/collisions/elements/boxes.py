@@ -9,7 +9,8 @@ import numpy as np
 
 from nmm.base.arrays import Array, Flags, array, positive, scalar, unwritable
 from nmm.base.errors import InputError, expect
-from nmm.model.collisions.sensed.cells import Cells, sorted_cells
+from nmm.model.collisions.elements.cell_mesh import cell_mesh
+from nmm.model.collisions.elements.cells import Cells, sorted_cells
 from nmm.model.collisions.shapes import Shape, hull
 
 #: Edge of the cells that points are sorted into, m.
@@ -74,12 +75,29 @@ class Elements(Shape):
         """Its elements by cells, and the field of bounds; made when first asked for."""
         return sorted_cells(self.centres, self.halves, self.cell, self.corner, self.inside)
 
+    def contains(self, point: Array) -> bool:
+        """Whether a point (3,), m, is in a box or inside of what is full; points contain nothing."""
+        cells, index = self.cells, np.floor((point - self.cells.corner) / self.cells.cell).astype(int)
+        if self.halves is None or np.any(index < 0) or np.any(index >= cells.field.shape):
+            return False
+        if cells.field[tuple(index)] < 0.0:
+            return True
+        flat = int(np.ravel_multi_index(tuple(index), cells.field.shape))
+        some = slice(int(cells.starts[flat]), int(cells.starts[flat + 1]))
+        halves = cells.halves if len(cells.halves) == 1 else cells.halves[some]
+        return bool(np.any(np.all(np.abs(cells.centres[some] - point) <= halves + 1e-9, axis=1)))
+
     def geometry(self) -> Any:
         """A box around all of it, which says where it is; distances to it are of `cells`."""
         low, high = self.box
         thick = max(THIN, THIN * float(np.max(high - low)))
         ends = np.array([low - thick, high + thick])
         return hull(np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i, j, k in np.ndindex(2, 2, 2)]))
+
+    def drawn(self) -> Any:
+        """The outer faces of cells with elements, larger cells where there would be too many faces."""
+        everywhere = self.centres if self.inside is None else np.vstack([self.centres, self.inside])
+        return cell_mesh(everywhere, self.corner, self.cell)
 
     def as_json(self) -> tuple[dict[str, Any], Array]:
         """All of it as plain data and an array (N, 3), for a file."""

@@ -5,7 +5,7 @@ import math
 
 from nmm.base.arrays import Array
 from nmm.base.kernels.compiled import compiled, scratch
-from nmm.model.collisions.sensed.shapes_record import BOX, DISC, HULL, ROUND, SensedShapes
+from nmm.model.collisions.elements.shapes_record import BOX, DISC, HULL, ROUND, SensedShapes
 from nmm.model.collisions.separation import corner_share, nearest_point
 
 #: Rounds of the algorithm.
@@ -90,8 +90,8 @@ def box_distance(
     out: Array,
 ) -> float:
     """A lower bound of the distance of a shape from a box, within the share `close` of it, or rough above
-    `enough`; `DEEP` where they overlap. at (3,) : the box's middle in the axes of the shape; half (3,) : its half
-    edges, 0 of a point, along the axes in which pose (12,) places the shape
+    `enough`; `DEEP` where they overlap. at (3,) : the box's middle in the axes of the shape; half (3,) :
+    half of its edges, 0 of a point, along the axes in which pose (12,) places the shape
 
     out (6,) : the direction from the shape to it, a guess of which it holds before, or 0; its nearest point
     """
