@@ -51,14 +51,14 @@ def test_bounds_are_below_distances_and_near_them(scene):
     for q in random_configurations(scene.robot, 60, seed=1):
         place_joints(shapes.joints, q, joints)
         exact = scene.queries.distances(0.0, q, pairs)
-        bound = np.array([pair_bound(shapes, joints, k, np.inf) for k in pairs])
+        bound = np.array([pair_bound(shapes, joints, k, np.inf, 0.0) for k in pairs])
         apart = exact > 0.0
         assert np.all(bound[apart] <= exact[apart] + 1e-6)
         # The closeness is of the cores, without the radii about them.
         assert np.all(bound[apart] >= exact[apart] - CLOSE * (exact[apart] + 0.5) - 1e-3)
         assert np.all(bound[exact < -1e-4] <= 0.0)
         for enough in (0.05, 0.5):
-            rough = np.array([pair_bound(shapes, joints, k, enough) for k in pairs])
+            rough = np.array([pair_bound(shapes, joints, k, enough, 0.0) for k in pairs])
             assert np.all(rough[apart] <= exact[apart] + 1e-6)
             assert np.all(rough[exact > enough + CLOSE * (exact + 0.5) + 1e-3] >= enough)
 
@@ -99,7 +99,7 @@ def test_pairs_come_nearer_no_faster_than_their_speed_and_its_change_say(scene):
         leg[3:] = robot.following.placed(leg[3:]) - robot.following.placed(np.zeros(robot.n))
         place_joints(shapes.joints, q, joints)
         axes(shapes.joints, joints, twists)
-        apart = np.array([pair_bound(shapes, joints, k, np.inf) for k in pairs])
+        apart = np.array([pair_bound(shapes, joints, k, np.inf, 0.0) for k in pairs])
         speed = np.array([speed_towards(shapes, q, leg, joints, twists, k) for k in pairs])
         change = np.array([bend(shapes, k, leg) for k in pairs])
         for share in (0.01, 0.1, 0.4, 1.0):
