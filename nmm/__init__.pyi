@@ -80,10 +80,14 @@ from .model.collisions import Box as Box
 from .model.collisions import Capsule as Capsule
 from .model.collisions import ConvexMesh as ConvexMesh
 from .model.collisions import Cylinder as Cylinder
+from .model.collisions import ElevationMap as ElevationMap
 from .model.collisions import HalfSpace as HalfSpace
 from .model.collisions import Hull as Hull
 from .model.collisions import Obstacle as Obstacle
+from .model.collisions import OccupancyMap as OccupancyMap
+from .model.collisions import PointCloud as PointCloud
 from .model.collisions import Sphere as Sphere
+from .model.collisions import VoxelMap as VoxelMap
 from .model.dynamics.dynamics import Dynamics as Dynamics
 from .model.dynamics.torques import Torques as Torques
 from .model.platforms import Car as Car

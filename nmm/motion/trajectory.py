@@ -327,7 +327,7 @@ class Trajectory:
             label=self.called if label is None else label,
             frame=self.frame,
             bodies=tuple(
-                Body(obstacle.name, obstacle.shape.geometry(), obstacle_places(obstacle, self.t))
+                Body(obstacle.name, obstacle.shape.drawn(), obstacle_places(obstacle, self.t))
                 for obstacle in self.obstacles
             ),
             nearest=Nearest(*near, self.clearance_names, self.clearance_asked)

@@ -12,6 +12,7 @@ from nmm.control.functions.program import Program
 from nmm.control.functions.references.orientation import rotation_vector
 from nmm.control.limits.collisions import Collisions
 from nmm.model.collisions.obstacle import Obstacle
+from nmm.model.collisions.sensed import OccupancyMap, PointCloud, VoxelMap
 from nmm.model.collisions.shapes import Box, Capsule, ConvexMesh, Cylinder, HalfSpace, Shape, Sphere
 from nmm.model.robots.loading.packages import package_file
 from nmm.model.robots.robot import Robot
@@ -19,7 +20,7 @@ from nmm.scenario.constructors import FunctionPart, MadePart, keys_of
 from nmm.scenario.files import PACKAGE, FileName
 from nmm.scenario.functions import REFERENCE_PARTS
 from nmm.scenario.keys import KeyedPart, OneOf, at, each
-from nmm.scenario.numbers import Positive
+from nmm.scenario.numbers import Number, Positive
 from nmm.scenario.robot import Three
 
 
@@ -83,6 +84,62 @@ SHAPE_PARTS: dict[str, type[ShapePart]] = {
 } | {"mesh": MeshPart}
 
 
+class SensedPart(ShapePart):
+    """What was sensed, with what a file says of where it is."""
+
+    loads: ClassVar[Any]
+
+    def obstacle(self, name: str) -> Obstacle:
+        """The obstacle where its file has it."""
+        with self.own_keys():
+            keys = self.model_dump(exclude={"kind", "file"})
+            file: str = self.model_dump()["file"]
+            try:
+                made: Obstacle = self.loads(file, name=name, **keys)
+            except InputError as error:  # it names the file, not the key
+                raise error.placed(f"file: {error.where}") from None
+            return made
+
+
+class PointCloudPart(SensedPart):
+    """The points of a file, and all within a radius of them."""
+
+    loads = PointCloud.load
+    kind: Literal["point_cloud"]
+    file: FileName = Field(description="PLY, PCD or NPZ, relative to the scenario")
+    radius: Annotated[Number, Field(ge=0.0)] = Field(0.01, description="of the balls about the points, m")
+
+
+def _load_map(file: str, name: str, height: float, unknown_cells: str) -> OccupancyMap:
+    return OccupancyMap.load(file, height, unknown_cells, name=name)
+
+
+class OccupancyMapPart(SensedPart):
+    """Walls where a map of Nav2's is occupied or unknown."""
+
+    loads = staticmethod(_load_map)
+    kind: Literal["occupancy_map"]
+    file: FileName = Field(description="the map's YAML file, relative to the scenario")
+    height: Positive = Field(2.0, description="of the walls, m")
+    unknown_cells: Literal["occupied", "free"] = Field("occupied", description="what they are")
+
+
+class VoxelMapPart(SensedPart):
+    """The occupied cells of an octree of OctoMap's."""
+
+    loads = VoxelMap.load
+    kind: Literal["voxel_map"]
+    file: FileName = Field(description="a .bt file, relative to the scenario")
+
+
+#: What obstacles may be, beside shapes that are drawn.
+OBSTACLE_PARTS: dict[str, type[ShapePart]] = SHAPE_PARTS | {
+    "point_cloud": PointCloudPart,
+    "occupancy_map": OccupancyMapPart,
+    "voxel_map": VoxelMapPart,
+}
+
+
 #: References that are points of time alone.
 PATH_PARTS: dict[str, type[FunctionPart]] = {
     kind: REFERENCE_PARTS[kind] for kind in ("line", "circle", "polynomial", "spline")
@@ -118,8 +175,9 @@ class ObstaclePart(KeyedPart):
     """A shape that the robot keeps away from; it stands at `xyz`, or moves along a path."""
 
     name: str = Field("", description="for messages; the shape's kind when not given")
-    shape: Annotated[ShapePart, OneOf(SHAPE_PARTS)] = Field(
-        description="kind box, sphere, cylinder, capsule, plane or mesh, with its keys"
+    shape: Annotated[ShapePart, OneOf(OBSTACLE_PARTS)] = Field(
+        description="kind box, sphere, cylinder, capsule, plane, mesh, point_cloud, occupancy_map or "
+        "voxel_map, with its keys"
     )
     xyz: Three | None = Field(None, description="its origin in the world, m; 0, 0, 0 when not given")
     rpy: Three = Field([0.0, 0.0, 0.0], description="roll, pitch, yaw about fixed axes, rad")
@@ -130,9 +188,17 @@ class ObstaclePart(KeyedPart):
     )
 
     def build(self, robot: Robot) -> Obstacle:
+        turned = rotation_vector(rpy=self.rpy)
+        if isinstance(self.shape, SensedPart):
+            if self.motion is not None:
+                raise InputError("what was sensed stands", where="motion", expected="xyz")
+            with at("shape"):
+                seen = self.shape.obstacle(self.name)
+            pose = Obstacle(seen.shape, [*(self.xyz or (0.0, 0.0, 0.0)), *turned]).placement(0.0)
+            seen.move_to(pose @ seen.placement(0.0))
+            return seen
         with at("shape"):
             shape = self.shape.build()
-        turned = rotation_vector(rpy=self.rpy)
         if self.motion is None:
             xyz = [0.0, 0.0, 0.0] if self.xyz is None else self.xyz
             return Obstacle(shape, [*xyz, *turned], name=self.name)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from pydantic_core import PydanticUndefined
 
 from nmm.base.kinds import REFERENCES, RESOLVERS, TASKS
-from nmm.scenario.collisions import SHAPE_PARTS, CollisionsPart, ObstaclePart
+from nmm.scenario.collisions import OBSTACLE_PARTS, CollisionsPart, ObstaclePart
 from nmm.scenario.disturbances import DisturbancesPart
 from nmm.scenario.functions import FUNCTION_PARTS, REFERENCE_PARTS, CameraFaultsPart
 from nmm.scenario.keys import KeyedPart
@@ -64,7 +64,7 @@ def sections() -> Iterator[ReferenceSection]:
         yield _section(f"limits.bounds, kind: {kind}", part)
     yield _section("collisions", CollisionsPart)
     yield _section("collisions.obstacles", ObstaclePart)
-    yield from _kinds("collisions.obstacles.shape", SHAPE_PARTS)
+    yield from _kinds("collisions.obstacles.shape", OBSTACLE_PARTS)
     yield _section("steering", SteeringPart)
     yield _section("scene", ScenePart)
     yield _section("scene.carried", CarriedPart)

@@ -407,6 +407,17 @@ def test_the_table_of_rooms_is_the_order_of_the_imports() -> None:
     ]
 
 
+def test_the_examples_of_what_is_sensed() -> None:
+    text = (ROOT / "docs" / "sensed.md").read_text(encoding="utf-8")
+    scan, room = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(scan, names)
+    assert names["cloud"].left_out == 50
+    assert names["plan"].trajectory().clearance_between.min() >= 0.03 - 1e-3
+    exec(room, names)
+    assert names["plan"].trajectory().clearance_between.min() >= 0.03 - 1e-3
+
+
 def test_the_example_of_limits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")
     code, classes = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)

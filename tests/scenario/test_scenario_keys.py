@@ -17,7 +17,7 @@ from nmm import Scenario, ScenarioError
 from nmm.base import kinds
 from nmm.control.integrators import METHODS
 from nmm.model.robots.configuration import Configuration
-from nmm.scenario.collisions import SHAPE_PARTS
+from nmm.scenario.collisions import OBSTACLE_PARTS
 from nmm.scenario.constructors import MadePart, documented, parameters
 from nmm.scenario.functions import FUNCTION_PARTS, REFERENCE_PARTS
 from nmm.scenario.limits import LIMIT_PARTS
@@ -259,7 +259,7 @@ def test_every_key_is_described() -> None:
     others = (*others, "limits", "limits.bounds", "until", "disturbances", "retreat", "plan", "plan.track")
     others = (*others, "steering", "scene", "scene.carried", "scene.scenery")
     others = (*others, *(f"task.when, kind: {kind}" for kind in CONDITION_PARTS))
-    others = (*others, "collisions", "collisions.obstacles", *SHAPE_PARTS)
+    others = (*others, "collisions", "collisions.obstacles", *OBSTACLE_PARTS)
     others = (*others, *(title for title in titles if title.endswith(", of any kind")))
     assert len(titles) == len(others) + sum(len(parts) for _, parts in REGISTERED) - len(shared)
 

@@ -131,6 +131,20 @@ def as_view(function: Plain) -> None:
     generated_in_callers(function, _type_of_view, _generate_view, kinds)
 
 
+def at_pointer(function: Plain, name: str) -> None:
+    """A function (address, count) -> array of numbers of numba's type `name` that lie there."""
+    kind = getattr(types, name)
+
+    def type_of(address: Any, count: Any) -> Any:
+        return types.Array(kind, 1, "C")(types.int64, types.int64)
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        data = builder.inttoptr(values[0], context.get_data_type(kind).as_pointer())
+        return array_at(context, builder, signature.return_type, data, [values[1]])
+
+    generated_in_callers(function, type_of, generate, (types.int64, types.int64))
+
+
 def by_address(function: Plain, signature: Signature) -> None:
     """A function (address, *arguments) that calls what lies there, with arguments of a signature."""
     known = to_numba(signature)

@@ -14,6 +14,8 @@ from nmm.base.kernels.record_layout import (
     Vector,
     views,
 )
+from nmm.model.collisions.elements.nearest import far_bound, into_axes
+from nmm.model.collisions.elements.shapes_record import SensedShapes
 
 
 class PairArrays(NamedTuple):
@@ -30,7 +32,8 @@ class PairArrays(NamedTuple):
     bounds (P,) : distances of near pairs, once measured, and lower bounds of the others'
     risky (P,), watched (P,) : the pairs listed for the look-ahead, and whether a pair is
     kept (P,) : what a pair's distance may not fall below; nearer (P,) : by how much a pair may be nearer than
-    what is asked for"""
+    what is asked for
+    sensed : obstacles that were sensed, second in their pairs"""
 
     band: Cell
     faces: Cell
@@ -50,6 +53,7 @@ class PairArrays(NamedTuple):
     watched: IntegerVector
     kept: Vector
     nearer: Vector
+    sensed: SensedShapes
 
 
 @compiled
@@ -99,7 +103,7 @@ def find_near(integers: Integers, floats: Array, places: Array) -> int:
     scene = views(PairArrays, integers, floats, 0)
     count = min(scene.boxes.shape[0], scene.planes[()])
     boxes, band = scene.boxes, float(scene.band[()])
-    centers = scratch((count + 1, 3))
+    centers, pose = scratch((count + 1, 3)), scratch(12)
     for i in range(count):
         to_world(places, i, boxes[i, 0], boxes[i, 1], boxes[i, 2], centers, i)
     changed = 0
@@ -115,6 +119,9 @@ def find_near(integers: Integers, floats: Array, places: Array) -> int:
             if bound < band:
                 bound = max(bound, outside_box(places, boxes, j, centers, i) - boxes[i, 6])
                 bound = max(bound, outside_box(places, boxes, i, centers, j) - boxes[j, 6])
+            if bound < band and scene.sensed.row[j] >= 0:
+                into_axes(places, j, i, pose)
+                bound = max(bound, far_bound(scene.sensed, scene.sensed.row[j], pose, i))
         scene.bounds[k] = bound
         near = 1 if bound < band else 0
         if near != scene.active[k]:

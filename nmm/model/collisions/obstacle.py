@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from nmm.base.arrays import Array, array, vector
 from nmm.base.errors import InputError, NmmError, RunError, expect, expect_kind, expect_known
 from nmm.base.text_format import one_line
+from nmm.model.collisions.elements.boxes import Elements
 from nmm.model.collisions.shapes import Box, Capsule, ConvexMesh, Cylinder, HalfSpace, Hull, Shape, Sphere
 
 #: Where a shape is: (3,) its origin, (6,) origin and rotation vector, or (4, 4); m, rad, world axes.
@@ -223,6 +224,8 @@ def shifts(obstacles: Sequence[Obstacle], t: Array) -> Array:
 
 def obstacle_as_json(shape: Shape) -> tuple[dict[str, Any], Array]:
     """A shape in plain data, and the points (N, 3) of a hull, so that a mesh's file is no longer needed."""
+    if isinstance(shape, Elements):
+        return shape.as_json()
     if isinstance(shape, ConvexMesh | Hull):
         return {"kind": "hull"}, np.array(shape.geometry().points()).reshape(-1, 3)
     parameters = {field.name: getattr(shape, field.name) for field in fields(shape)}  # type: ignore[arg-type]  # all are dataclasses
@@ -231,6 +234,8 @@ def obstacle_as_json(shape: Shape) -> tuple[dict[str, Any], Array]:
 
 def shape_from_json(data: Mapping[str, Any], points: Array) -> Shape:
     """The shape that `obstacle_as_json` described; `InputError` or `TypeError` for what it cannot have."""
+    if data.get("kind") == "elements":
+        return Elements.from_json(dict(data), points)
     expect_known("kind", data.get("kind"), KINDS)
     parameters = {key: value for key, value in data.items() if key != "kind"}
     if data["kind"] == "hull":

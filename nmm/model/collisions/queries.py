@@ -16,6 +16,9 @@ from nmm.base.kernels.compiled import checked_by_caller, compiled
 from nmm.base.kernels.record_layout import BLOCKS, Blocks, Memory, views
 from nmm.base.kernels.signatures import float64, int64, void
 from nmm.model.collisions.broad_phase import PairArrays, find_near
+from nmm.model.collisions.elements.boxes import Elements
+from nmm.model.collisions.elements.nearest import measure_sensed
+from nmm.model.collisions.elements.shapes_record import sensed_shapes
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.collisions.pairs import box_around, pairs_of
 from nmm.model.collisions.rows import DistanceRows, write_row, write_rows
@@ -24,10 +27,30 @@ from nmm.model.robots.robot import Robot
 
 #: Of Coal's queries: with its default, 1e-6, gradients err by up to 9e-3; a finer second one diverges.
 GJK_TOLERANCE, EPA_TOLERANCE = 1e-8, 1e-6
+#: How far from what was sensed the nearest of it is looked for where a motion's distances are reported, m;
+#: beyond, a lower bound is.
+REPORTED = 1.0
 _STRIDED = float64[:, :]
 _FIND = int64(*BLOCKS.types, _STRIDED)
 _ROW = void(BLOCKS, _STRIDED, _STRIDED, BLOCKS, int64, int64)
+_PAIR = void(BLOCKS, _STRIDED, _STRIDED, int64, float64)
+_SENSED = void(BLOCKS, _STRIDED, _STRIDED)
 _ROWS = float64(BLOCKS, _STRIDED, _STRIDED, _STRIDED, BLOCKS, int64)
+
+
+@compiled
+def _measure_pair(blocks: Blocks, places: Array, results: Array, pair: int, reach: float) -> None:
+    scene = views(PairArrays, blocks.integers, blocks.floats, 0)
+    measure_sensed(scene.sensed, places, scene.pairs[pair, 0], scene.pairs[pair, 1], reach, results[pair])
+
+
+@compiled
+def _measure_near(blocks: Blocks, places: Array, results: Array) -> None:
+    scene = views(PairArrays, blocks.integers, blocks.floats, 0)
+    for pair in range(scene.pairs.shape[0]):
+        i, j = scene.pairs[pair, 0], scene.pairs[pair, 1]
+        if scene.active[pair] == 1 and scene.sensed.row[j] >= 0:
+            measure_sensed(scene.sensed, places, i, j, scene.band[()], results[pair])
 
 
 @compiled
@@ -80,6 +103,10 @@ class Queries:
         self.least = np.inf
         self.moving = [(i, obstacle) for i, obstacle in enumerate(obstacles, self._own)]
         self._seen: dict[int, Any] = {}
+        self._sensed = np.flatnonzero(self.scene.sensed.row[self.scene.pairs[:, 1]] >= 0).tolist()
+        self._others = {*range(len(self.scene.pairs))} - {*self._sensed}
+        self._near = checked_by_caller(_measure_near, _SENSED) if self._sensed else None
+        self._pair = checked_by_caller(_measure_pair, _PAIR) if self._sensed else None
         self._find = checked_by_caller(find_near, _FIND)
         self._row = checked_by_caller(_row, _ROW)
         self._rows = checked_by_caller(write_rows, _ROWS)
@@ -108,11 +135,15 @@ class Queries:
         self.place(t, q)
         self._choose()
         pin.computeDistances(self.shapes, self.found)
+        if self._near is not None:
+            self._near(self.blocks, self.places, self.results)
 
     def _choose(self) -> None:
         """Find which pairs are near where the shapes are, for Pinocchio too."""
         changed, active, geometry_data = self.scene.changed, self.scene.active, self.found
         for k in changed[: self._find(*self.blocks, self.places)].tolist():
+            if k not in self._others:
+                continue
             if active[k]:
                 geometry_data.activateCollisionPair(k)
             else:
@@ -139,11 +170,17 @@ class Queries:
         rows.pair[slot] = pair
         self._row(self.blocks, self.places, self.J, *self._where, slot)
 
+    def _compute(self, pair: int, reach: float) -> None:
+        if self._pair is None or pair in self._others:
+            pin.computeDistance(self.shapes, self.found, pair)
+        else:
+            self._pair(self.blocks, self.places, self.results, pair, reach)
+
     def distances(self, t: float, q: Array, pairs: Sequence[int]) -> Array:
         """Of some pairs at (t, q), (len(pairs),), m."""
         self.place(t, q)
         for k in pairs:
-            pin.computeDistance(self.shapes, self.found, int(k))
+            self._compute(int(k), float(self.scene.band[()]))
         return self.results[list(pairs), 0]
 
     def inside(self, pair: int) -> bool:
@@ -151,6 +188,9 @@ class Queries:
         i, j = (int(index) for index in self.scene.pairs[pair])
         if j < self._own:
             return False
+        shape = self.moving[j - self._own][1].shape
+        if isinstance(shape, Elements):
+            return shape.contains(self.found.oMg[j].actInv(self.found.oMg[i].act(self.scene.boxes[i, :3])))
         point_pose = coal.Transform3s(np.eye(3), self.found.oMg[i].act(self.scene.boxes[i, :3]))
         shape_pose = coal.Transform3s(self.found.oMg[j].rotation, self.found.oMg[j].translation)
         point, geometry = coal.Sphere(1e-6), self.shapes.geometryObjects[j].geometry
@@ -168,7 +208,7 @@ class Queries:
         for k in np.argsort(bounds, kind="stable").tolist():
             if bounds[k] > least:
                 break  # no other pair is nearer than its bound
-            pin.computeDistance(self.shapes, self.found, k)
+            self._compute(k, min(least, REPORTED))
             d = float(self.results[k, 0])
             if d < least:
                 least, nearest = d, k
@@ -211,7 +251,8 @@ def _scene(
         for joint in robot.model.supports[shape.parentJoint].tolist()[1:]:
             supports[i, robot.model.joints[joint].idx_v] = 1.0
         boxes[i] = box_around(shape.geometry)
-        points, rounding[i] = corners_of(shape.geometry)
+        seen = i >= own and isinstance(obstacles[i - own].shape, Elements)
+        points, rounding[i] = (np.zeros((0, 3)), 0.0) if seen else corners_of(shape.geometry)
         corners.append(points)
     pairs = np.array(pairs_of(shapes), dtype=np.int64).reshape(-1, 2)
     P = len(pairs)
@@ -235,6 +276,9 @@ def _scene(
         watched=np.zeros(P, dtype=np.int64),
         kept=np.zeros(P),
         nearer=np.zeros(P),
+        sensed=sensed_shapes(
+            [shape.geometry for shape in objects], [obstacle.shape for obstacle in obstacles], own
+        ),
     )
 
 

@@ -13,6 +13,7 @@ import pinocchio as pin
 
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError, RobotError, few
+from nmm.model.collisions.elements.boxes import Elements
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.collisions.pairs import (
     always_near,
@@ -154,7 +155,10 @@ def set_up(
         left_out |= matches
     wanted = [pair for pair in wanted if pair not in left_out]
     always = [pair for pair in wanted if pair in own_near]
-    always += always_near(robot, shapes, boxes, [pair for pair in wanted if pair[1] >= count], distance)
+    # Pairs with what was sensed are in none of them: Coal knows a box around it.
+    seen = {j for j, obstacle in enumerate(sorted_obstacles, count) if isinstance(obstacle.shape, Elements)}
+    others = [pair for pair in wanted if pair[1] >= count and pair[1] not in seen]
+    always += always_near(robot, shapes, boxes, others, distance)
     if always:
         near = list(dict.fromkeys(name(pair) for pair in always))
         notes.append(

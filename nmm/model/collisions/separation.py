@@ -128,7 +128,7 @@ def corner_share(a: Array, b: Array, c: Array, weights: Array) -> None:
 @compiled
 def nearest_point(simplex: Array, count: int, v: Array) -> int:
     """v (3,): the point of a simplex of `count` corners nearest to the origin. Keeps the corners that it
-    needs, and returns how many; 4 where the origin is inside."""
+    needs, first in simplex (4, 3 or more), and returns how many; 4 where the origin is inside."""
     weights, trial = scratch(4), scratch(4)
     point = scratch(3)
     least = math.inf
@@ -169,7 +169,7 @@ def nearest_point(simplex: Array, count: int, v: Array) -> int:
     remaining = 0
     for corner in range(count):
         if weights[corner] > 0.0:
-            for axis in range(3):
+            for axis in range(simplex.shape[1]):
                 simplex[remaining, axis] = simplex[corner, axis]
             remaining += 1
     return remaining

@@ -41,6 +41,10 @@ class Shape(ABC):
     def geometry(self) -> Any:
         """Coal's shape, convex."""
 
+    def drawn(self) -> Any:
+        """What is drawn of it, a shape of Coal's, too, or a mesh."""
+        return self.geometry()
+
 
 @dataclass(frozen=True)
 class Box(Shape):

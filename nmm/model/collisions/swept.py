@@ -22,6 +22,7 @@ from nmm.base.kernels.record_layout import (
     views,
 )
 from nmm.model.collisions.broad_phase import PairArrays
+from nmm.model.collisions.elements.nearest import into_axes, placed_sensed
 from nmm.model.robots.zero_order_hold import Inputs, hold
 
 #: Two looks are no farther apart than this, in m and rad of the coordinates together.
@@ -180,6 +181,12 @@ def renew(blocks: Blocks, way_blocks: Blocks, results: Array, places: Array, pai
 def gap(scene: PairArrays, way: SweptMotion, pair: int, ends: Array, enough: float = math.inf) -> float:
     """A lower bound of a pair's distance, m, rough above `enough`; ends (2, 12): where its shapes are."""
     best = -math.inf
+    row = scene.sensed.row[scene.pairs[pair, 1]]
+    if row >= 0:
+        pose, nearest = scratch(12), scratch(6)
+        into_axes(ends, 1, 0, pose)
+        least = enough if math.isfinite(enough) else 0.0
+        return float(placed_sensed(scene.sensed, row, pose, scene.pairs[pair, 0], enough, least, nearest))
     for side in range(2):
         other = scene.pairs[pair, 1 - side]
         x = way.planes[pair, side]

@@ -214,8 +214,7 @@ def still(robot: Robot, q: Array, obstacles: Iterable[Obstacle], **beside: Any) 
     """A robot that stands at q (n,), with obstacles as at t = 0, and what else is beside it."""
     now = np.zeros(1)
     bodies = tuple(
-        Body(obstacle.name, obstacle.shape.geometry(), obstacle_places(obstacle, now))
-        for obstacle in obstacles
+        Body(obstacle.name, obstacle.shape.drawn(), obstacle_places(obstacle, now)) for obstacle in obstacles
     )
     return Motion(robot, now, q[np.newaxis], np.zeros((1, robot.n_u)), bodies=bodies, **beside)
 

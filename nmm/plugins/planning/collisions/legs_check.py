@@ -19,6 +19,8 @@ from nmm.base.kernels.kinematics import Joints, axes, compose, moved, place_join
 from nmm.base.kernels.linear_algebra import copied, dot, norm
 from nmm.base.kernels.record_layout import IntegerCell, IntegerVector, Matrix, Vector, views
 from nmm.base.kernels.velocity_map import place_mimic_joints
+from nmm.model.collisions.elements.nearest import sensed_bound
+from nmm.model.collisions.elements.shapes_record import SensedShapes
 from nmm.model.collisions.separation import ConvexShapes, extreme, separation
 
 #: Pairs within this beyond their distance count as too near, m: else motions along a wall take looks without
@@ -41,6 +43,7 @@ class MovedShapes(NamedTuple):
         not move can reach, m; else infinite
     kept (P,) : distances to keep, m; stays (3, 2) : where a platform's x, y and theta stay, m and rad
     drift (P,) : how far the obstacle of a pair moves at most during the motion that is looked at, m
+    sensed : obstacles that were sensed
     until (P,), fastest (P,), bends (P,) : while a leg is looked at, how much of it is surely free; `approach`
         and, once it was asked for, `bend`
     places (G, 12), centres (G, 3) : where shapes are, and the centres of their boxes, in the world
@@ -62,6 +65,7 @@ class MovedShapes(NamedTuple):
     bends: Vector
     places: Matrix
     centres: Matrix
+    sensed: SensedShapes
 
 
 @compiled
@@ -112,6 +116,9 @@ def placed_bound(scene: MovedShapes, pair: int, enough: float, least: float) -> 
         apart = max(math.sqrt(square) - shapes.boxes[j, 6], math.sqrt(beyond)) - shapes.boxes[i, 6]
         if apart >= enough:
             return apart
+    if scene.sensed.row[j] >= 0:
+        exact = enough if math.isnan(least) else least + MARGIN
+        return sensed_bound(scene.sensed, places, i, j, enough, exact, shapes.between[pair])
     return separation(shapes, places, pair, enough, least)
 
 
@@ -260,7 +267,9 @@ def look(scene: MovedShapes, q: Array, leg: Array, share: float, joints: Array, 
             if apart < least + MARGIN:
                 return -1.0 - pair
             free = (apart - least) / approach(scene, pair, leg, apart)
-            if steady == 1 and share + free < 1.0:
+            # The second is of convex shapes: of points that were sensed each has a direction of its own.
+            convex = scene.sensed.row[scene.shapes.pairs[pair, 1]] < 0
+            if steady == 1 and convex and share + free < 1.0:
                 speed = speed_towards(scene, q, leg, joints, twists, pair)
                 if scene.bends[pair] < 0.0:
                     scene.bends[pair] = bend(scene, pair, leg)

@@ -9,6 +9,7 @@ from nmm.base.arrays import Array, Integers
 from nmm.base.kernels.compiled import checked_by_caller, compiled
 from nmm.base.kernels.record_layout import BLOCKS, Blocks, Memory, views
 from nmm.base.kernels.signatures import float64, int64
+from nmm.model.collisions.elements.shapes_record import sensed_shapes
 from nmm.model.collisions.pairs import measured_pairs, pairs_of
 from nmm.model.collisions.scene import Scene
 from nmm.model.collisions.separation import ConvexShapes
@@ -79,7 +80,13 @@ class MotionCheck:
         if self._measure is None:
             self._measure = measured_pairs(scene.robot, scene.shapes, pairs_of(scene.shapes), scene.boxes)
         measure, enough = self._measure, most + 4.0 * MARGIN
-        return np.asarray(np.min([measure(q, enough) for q in configurations], axis=0))
+        least = np.asarray(np.min([measure(q, enough) for q in configurations], axis=0))
+        sensed = np.flatnonzero(self._shapes.sensed.row[self.pairs[:, 1]] >= 0)
+        if len(sensed):  # of these Coal knows the box around all
+            least[sensed] = np.min(
+                [scene.queries.distances(0.0, q, sensed.tolist()) for q in configurations], axis=0
+            )
+        return least
 
     @property
     def kept(self) -> Array:
@@ -124,7 +131,7 @@ def moved_shapes(robot: Robot, scene: Scene | None) -> MovedShapes:
     """The record of a scene with obstacles where they are at t = 0."""
     n, none = 3 + robot.n, np.zeros(0, dtype=np.int64)
     parts, pairs = shape_parts((), none, robot.joint_axes, np.zeros((0, 7))), none.reshape(0, 2)
-    levers, stems, planes = *np.zeros((2, 0, n)), 0
+    levers, stems, planes, sensed = *np.zeros((2, 0, n)), 0, sensed_shapes((), (), 0)
     if scene is not None:
         own, listed = own_parts(robot, scene.meshes, scene.distance), pairs_of(scene.shapes)
         count, objects = len(own.levers), scene.shapes.geometryObjects.tolist()
@@ -138,6 +145,8 @@ def moved_shapes(robot: Robot, scene: Scene | None) -> MovedShapes:
             if pair[1] < count:
                 levers[k], stems[k] = own.between[pair]
         planes = sum(isinstance(obstacle.shape, HalfSpace) for obstacle in scene.obstacles)
+        geometries = [shape.geometry for shape in objects]
+        sensed = sensed_shapes(geometries, [obstacle.shape for obstacle in scene.obstacles], count)
     first_corner = np.cumsum([0, *map(len, parts.corners)], dtype=np.int64)
     corners = np.concatenate([*parts.corners, np.zeros((0, 3))])
     degrees, neighbours = np.zeros(len(corners), dtype=np.int64), []
@@ -174,4 +183,5 @@ def moved_shapes(robot: Robot, scene: Scene | None) -> MovedShapes:
         bends=np.zeros(len(pairs)),
         places=np.zeros((len(parts.boxes), 12)),
         centres=np.zeros((len(parts.boxes), 3)),
+        sensed=sensed,
     )

@@ -10,3 +10,7 @@ from .reading import placement as placement
 from .reading import rates as rates
 from .reading import stamp as stamp
 from .reading import twist as twist
+from .sensed import SeenCloud as SeenCloud
+from .sensed import cloud as cloud
+from .sensed import clouds as clouds
+from .sensed import occupancy as occupancy

@@ -1,0 +1,106 @@
+"""Elements sorted into cells, and a field of lower bounds of the distance from each cell to the nearest."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nmm.base.arrays import Array, Flags
+
+#: More cells than this are made larger, in whole multiples.
+MOST = 8_000_000
+#: The field is less than the bound by this share: its numbers and those they come of are rounded to 24 bits.
+ROUNDED = 1e-5
+#: The field in cells inside of what is full, whose boxes are no elements, m.
+INSIDE = -1.0
+
+
+class Cells(NamedTuple):
+    """N elements in nx × ny × nz cells.
+
+    corner (3,), cell (3,) : the least corner of all cells, and a cell's edges, m
+    starts (nx ny nz + 1,) : the first element of each cell, z fastest
+    centres (N, 3), halves (N, 3), (1, 3) of all, or (0, 3) : the elements by cells, m; without halves points
+    field (nx, ny, nz) : no point of a cell is nearer to a point of an element, m; `INSIDE` inside
+    """
+
+    corner: Array
+    cell: Array
+    starts: NDArray[np.int32]
+    centres: Array
+    halves: Array
+    field: NDArray[np.float32]
+
+
+def sorted_cells(
+    centres: Array, halves: Array | None, cell: Array, corner: Array, inside: Array | None = None
+) -> Cells:
+    """The cells of elements, each of which lies within the cell of its centre; larger ones where there were
+    too many."""
+    everywhere = centres if inside is None or not len(inside) else np.vstack([centres, inside])
+    first = np.floor((everywhere.min(axis=0) - corner) / cell)
+    corner, edge, times = corner + first * cell, cell, 1
+    while True:
+        last = np.floor((everywhere.max(axis=0) - corner) / edge)
+        counts = last.astype(np.int64) + 1
+        if float(np.prod(last + 1.0)) <= MOST:
+            break
+        times += 1
+        edge = cell * times
+    if times > 1 and inside is not None and halves is not None and len(inside):
+        # In larger cells those inside are elements, too: a cell may hold both.
+        centres, halves = everywhere, np.vstack([halves, np.tile(0.5 * cell, (len(inside), 1))])
+        inside = None
+    flat = _numbers(centres, corner, edge, counts)
+    order = np.argsort(flat, kind="stable")
+    starts = np.zeros(int(np.prod(counts)) + 1, dtype=np.int32)
+    np.cumsum(np.bincount(flat, minlength=len(starts) - 1), out=starts[1:])
+    full = np.diff(starts).reshape(counts) > 0
+    if inside is not None and len(inside):
+        within = np.zeros(int(np.prod(counts)), dtype=bool)
+        within[_numbers(inside, corner, edge, counts)] = True
+        within = within.reshape(counts) & ~full
+        full |= within
+    field = far_field(full, edge)
+    if inside is not None and len(inside):
+        field[within] = INSIDE
+    boxes = np.zeros((0, 3))
+    if halves is not None:
+        boxes = halves[:1].copy() if halves.strides[0] == 0 else halves[order]
+    return Cells(corner, edge, starts, centres[order], boxes, field)
+
+
+def _numbers(points: Array, corner: Array, cell: Array, counts: NDArray[np.int64]) -> NDArray[np.int64]:
+    index = np.floor((points - corner) / cell).astype(np.int64)
+    np.clip(index, 0, counts - 1, out=index)
+    return np.asarray((index[:, 0] * counts[1] + index[:, 1]) * counts[2] + index[:, 2])
+
+
+def far_field(full: Flags, cell: Array) -> NDArray[np.float32]:
+    """Lower bounds of the distance from anywhere in a cell to anywhere in the nearest full cell, m.
+
+    Along an axis two cells with numbers i and j are at least (|i - j| - 1) h apart. The least of
+    sqrt(sum (max(|i - j| - 1, 0) h)²) over full cells is the distance between the centres of a cell and of
+    the nearest one among the full cells grown by their 26 neighbours.
+    """
+    import edt
+
+    grown = full.copy()
+    for axis in range(3):
+        ahead, behind = (
+            tuple(slice(*ends) if k == axis else slice(None) for k in range(3))
+            for ends in ((1, None), (None, -1))
+        )
+        before = grown.copy()
+        grown[ahead] |= before[behind]
+        grown[behind] |= before[ahead]
+    # In three axes of which the last has one cell it takes thirty times as long as in two.
+    wide = [axis for axis in range(3) if full.shape[axis] > 1]
+    wide += [axis for axis in range(3) if axis not in wide][: max(0, 2 - len(wide))]
+    free = np.ascontiguousarray(~grown).reshape([full.shape[axis] for axis in wide])
+    apart = edt.edt(free, anisotropy=tuple(cell[wide].tolist()), black_border=False, parallel=1)
+    field = np.ascontiguousarray(apart, dtype=np.float32).reshape(full.shape)
+    field *= np.float32(1.0 - ROUNDED)
+    return field
