@@ -55,12 +55,12 @@ def test_a_kernel_compiled_gives_what_it_gives_in_python(
         q, u = moving(robot, rng, fast)
         sample, frames = sample_at(robot, q, u, DT), frames_at(robot, q, stage)
         one, other = unlimited(robot, stage), unlimited(robot, stage)
-        both_forms(*(stage.kernel, *((sample, frames, stage.numbers, rows) for rows in (one, other))))
+        both_forms((stage.kernel, *((sample, frames, stage.numbers, rows) for rows in (one, other))))
         for plain, made in zip(one, other, strict=True):
             assert_same(plain, made, 1e-12)
         values = np.zeros((2, len(limit.rows(robot))))
         u_dot = rng.normal(size=robot.n_u)
-        both_forms(*(stage.values, *((sample, frames, stage.numbers, u_dot, out) for out in values)))
+        both_forms((stage.values, *((sample, frames, stage.numbers, u_dot, out) for out in values)))
         assert_same(*values, 1e-12)
 
 

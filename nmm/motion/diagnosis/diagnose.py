@@ -8,7 +8,7 @@ import numpy as np
 
 from nmm.base.findings import Finding
 from nmm.control.controller import Controller
-from nmm.control.functions.function import Function, Renewal, row_scales
+from nmm.control.functions.function import row_scales
 from nmm.control.goal import Goal, error_sizes
 from nmm.control.sequencing.sequence import Schedule
 from nmm.motion.clearance import Swept
@@ -174,11 +174,9 @@ def _at_end(verdict: Verdict, leg: Leg, goal: Goal | None) -> Verdict:
         return verdict
     at_end = float(recorder.t[-1]), recorder.so_far.q[-1], recorder.disturbed
     first = min((task.priority for task in controller.task), default=0)
-    leads: tuple[Function | Renewal, ...] = (
-        *(task.function for task in controller.task if task.priority == first),
-        *controller.solver.program.renewals,
-    )
-    for left in filter(None, (function.left(*at_end) for function in leads)):
+    ways = [task.function.left(*at_end) for task in controller.task if task.priority == first]
+    ways += [renewal.left(*at_end) for renewal in controller.solver.program.renewals]
+    for left in filter(None, ways):
         reason = Finding("not_reached", {"within": recorder.duration, "m": left[0], "rad": left[1]})
         return replace(verdict, outcome=Outcome.MISSED, reasons=(reason, *verdict.reasons))
     return verdict

@@ -13,7 +13,7 @@ from nmm.model.robots.loading.xml_tree import Element
 _JOINTS = ("hinge", "slide", "free")
 
 
-class Elements:
+class ElementReader:
     """Reads a file's elements with its units, meshes and colours by name, its folder from the robot's."""
 
     def __init__(

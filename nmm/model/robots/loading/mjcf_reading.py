@@ -9,7 +9,7 @@ from typing import NamedTuple
 import pinocchio as pin
 
 from nmm.model.robots.loading.budget import MOST_LINKS
-from nmm.model.robots.loading.mjcf_elements import Elements
+from nmm.model.robots.loading.mjcf_elements import ElementReader
 from nmm.model.robots.loading.mjcf_files import include, inside, parsed
 from nmm.model.robots.loading.mjcf_numbers import ORIGIN, ROTATIONS, Numbers, at
 from nmm.model.robots.loading.mjcf_tree import MjcfBody, Part, moved, names_in, renamed
@@ -109,7 +109,7 @@ class _Model:
             self._classes[default.get("class", "main")] = self._classes["main"]
         assets = [part for section in children(root, "asset") for part in inside(section)]
         meshes = [self._with_defaults(asset, "main") for asset in assets if asset.tag == "mesh"]
-        self._elements = Elements(
+        self._elements = ElementReader(
             self._numbers,
             self.settings,
             {mesh.get("name", _stem(mesh)): mesh for mesh in meshes},
