@@ -124,7 +124,7 @@ class Towing:
         self.smoothing = Smoothing(robot, limits, usual, check, costs)
         self.motions = self.configurations = 0
         n, count = robot.n, len(self.tractor.trailers)
-        folds = limits.coordinates[3 : 3 + count]
+        folds = allowed(robot, limits)[3 : 3 + count]
         radius = least_radius(self.tractor, folds)
         train = sum(abs(trailer.hitch) + trailer.length for trailer in self.tractor.trailers)
         around = np.array([AROUND * train, AROUND * train, 0.0])
