@@ -65,6 +65,7 @@ class HeldWays:
     ----------
     trees : whose ways are the platform's, and which count what was looked at
     clock : the time that is left, s
+    within (n, 2) : limits of coordinates, m and rad
     """
 
     def __init__(
@@ -74,6 +75,7 @@ class HeldWays:
         trees: Trees,
         rng: np.random.Generator,
         clock: Callable[[], float],
+        within: Array,
     ) -> None:
         self.asked, self.timing, self.trees, self.rng, self.clock = asked, timing, trees, rng, clock
         self.robot, self.held, self.check, self.guide = (
@@ -82,7 +84,7 @@ class HeldWays:
             timing.held.check,
             timing.guide,
         )
-        self._first = self.held.platform
+        self._first, self.within = self.held.platform, within
         self.low, self.high = trees.low.copy(), trees.high.copy()
         self._ended: Counter[int] = Counter()
 
@@ -113,7 +115,9 @@ class HeldWays:
 
     def poses(self, wanted: Wanted, start: Array) -> list[Array]:
         """Platform coordinates (n_p,) of those of a goal's alternatives at which the arm can hold."""
-        postures = HeldPostures(self.robot, self.low, self.high, self.check, self.asked.tolerance)
+        postures = HeldPostures(
+            self.robot, self.low, self.high, self.check, self.asked.tolerance, self.within
+        )
         postures.held, poses = self.held, []
         for goal in alternatives(wanted):
             if not isinstance(goal, Mapping) or set(goal) != {"x", "y", "theta"}:
