@@ -124,6 +124,7 @@ class Prepared:
             random=np.ones(1, dtype=np.int64),
             met=np.zeros(2, dtype=np.int64),
             looked=np.zeros(2, dtype=np.int64),
+            rounds=np.zeros(1, dtype=np.int64),
         )
 
     def _lay_out(self, check: MotionCheck) -> None:

@@ -163,6 +163,7 @@ class PlanSearch:
             trees.nodes[k, :count] = [*roots, *chain]
             trees.parents[k, : len(roots)] = -1
             trees.parents[k, len(roots) : count] = [0, *range(len(roots), count - 1)][: len(chain)]
+        trees.rounds[:] = 0
         scratch, looked = np.zeros((LEGS, 3 + self.robot.n)), int(trees.looked[0])
         while True:
             outcome = self._search(*self.check.blocks, ROUNDS, scratch)
