@@ -20,6 +20,7 @@ from nmm.model.robots.zero_order_hold import inputs_of
 from nmm.plugins.planning.collisions.motion_check import MotionCheck
 from nmm.plugins.planning.objective import SampleCosts
 from nmm.plugins.planning.samples import SampledMotion
+from nmm.plugins.planning.search_space import allowed
 from nmm.plugins.planning.smoothing import Smoothing
 from nmm.plugins.planning.trailers import DRIVEN, SEARCH, SPACING, TRACE, Trains, search_trains, trace
 from nmm.plugins.planning.tree import MODULUS
