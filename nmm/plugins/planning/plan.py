@@ -203,4 +203,5 @@ class Plan:
         (q, u), objective = self(t), self.found.asked.objective
         H = None if objective is None else SampleCosts(self.robot, objective).at(q)[0]
         constraints = self.found.limits, self.found.scene
-        return recorded(self.robot, t, q, u, dt, task, *constraints, "plan", H=H)
+        with self.found.prepared.lock:  # a Planner's plans share their scene
+            return recorded(self.robot, t, q, u, dt, task, *constraints, "plan", H=H)
