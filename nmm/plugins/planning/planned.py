@@ -187,5 +187,6 @@ def _found(search: PlanSearch, motion: TimedMotion) -> Plan:
 
 
 def _plan(search: PlanSearch, motion: TimedMotion, motions: int, postures: int) -> Plan:
+    search.keep_asked()  # no margin, and nothing that the last part added
     result = Found(motion, search.goals[-1], search.tree, search.prepared, search.check.nearer)
     return Plan(search.robot, motions, postures, result)

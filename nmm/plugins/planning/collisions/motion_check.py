@@ -100,7 +100,7 @@ class MotionCheck:
         if self.scene is not None:
             for names, kept in zip(self.scene.names, self.kept.tolist(), strict=True):
                 if kept < self.scene.distance:
-                    pairs[names] = min(kept - MARGIN, pairs.get(names, np.inf))
+                    pairs[names] = min(max(kept - MARGIN, 0.0), pairs.get(names, np.inf))
         return pairs
 
     @property
