@@ -19,7 +19,14 @@ from nmm.base.errors import InputError, RunError
 from nmm.model.platforms.tractor import Tractor
 from nmm.model.robots.robot import Robot
 from nmm.plugins.planning.collisions.legs_check import MARGIN
-from nmm.plugins.planning.goals import ATTEMPTS, GoalPostures, Wanted, alternatives, nothing_found
+from nmm.plugins.planning.goals import (
+    ATTEMPTS,
+    GoalPostures,
+    Wanted,
+    alternatives,
+    expect_within,
+    nothing_found,
+)
 from nmm.plugins.planning.held_motion import ROUND, HeldTiming
 from nmm.plugins.planning.holding import ARRIVED, BLOCKED, LOST, Held
 from nmm.plugins.planning.prepared import Asked
@@ -126,6 +133,7 @@ class HeldWays:
                 raise InputError(where="plan: goal", expected=expected, got=got)
             pose = start[: self._first].copy()
             pose[:3] = self.robot.q(goal)[:3]
+            expect_within(self.robot, self.robot.q(goal), range(3), self.within)
             if postures.find(pose, start, self.rng, 1):
                 poses.append(pose)
         if poses:
