@@ -123,7 +123,8 @@ class MotionCheck:
         return int(self._near(self.blocks, q))
 
     def blocked(self, q: Array, legs: Array) -> int:
-        """The number of a pair that comes too near on legs (L, 3 + n) from q (n,), which is free, or -1."""
+        """The number of a pair that comes too near on legs (L, 3 + n) from q (n,), which is free,
+        their number where the platform leaves where it stays, or -1."""
         return int(self._blocked(*self.blocks, q, legs, len(legs), np.empty_like(q)))
 
 
