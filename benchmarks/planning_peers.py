@@ -23,6 +23,7 @@ import numpy as np
 from planning import DISTANCE, KINDS, LIMITS, SIX, Scene, checked
 
 import nmm
+from nmm.plugins.planning.planned import finished
 from nmm.plugins.planning.prepared import Asked, Prepared
 from nmm.plugins.planning.search import PlanSearch
 
@@ -106,7 +107,7 @@ def of_ompl(scene: Scene, seed: int) -> nmm.Plan:
         raise nmm.RunError("OMPL found no path", where="plan")
     setup.simplifySolution()
     corners = [start, *(read(one).copy() for one in setup.getSolutionPath().getStates()[1:])]
-    return search.finished(np.vstack([*legs(search, corners)]))
+    return finished(search, np.vstack([*legs(search, corners)]))
 
 
 def legs(search: PlanSearch, corners: list[np.ndarray]) -> Iterator[np.ndarray]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -138,6 +138,7 @@ class GoalPostures:
             own = {robot.coordinate(name) for name in wanted if name in robot.q_names}
             if "posture" in wanted and "posture" not in robot.q_names:
                 own |= {robot.coordinate(name) for name in robot.postures[str(wanted["posture"])]}
+            expect_within(robot, named, own, self.within)
             free = [i for i in robot.following.independent if i not in own]
             for k in range(1 + (ATTEMPTS if free else 0)):
                 q = start.copy() if k == 0 else rng.uniform(self.low, self.high)
@@ -149,10 +150,16 @@ class GoalPostures:
         else:
             q = robot.q(wanted)  # type: ignore[arg-type]  # which says what is wrong with it
             robot.check_limits(q)
-            outside = robot.outside(q, self.within)
-            if outside:
-                raise InputError(f"outside its limits: {few([*outside.values()])}", where="plan: goal")
+            expect_within(robot, q, range(robot.n), self.within)
             yield q
+
+
+def expect_within(robot: Robot, q: Array, which: Iterable[int], within: Array | None) -> None:
+    """`InputError` for a goal of which these coordinates of q (n,) are outside limits (n, 2)."""
+    outside, names = robot.outside(q, within), {robot.q_names[i] for i in which}
+    words = [text for name, text in outside.items() if name in names]
+    if words:
+        raise InputError(f"outside its limits: {few(words)}", where="plan: goal")
 
 
 def goal_task(robot: Robot, goal: Any, end: Array) -> Task:

@@ -19,7 +19,14 @@ from nmm.base.errors import InputError, RunError
 from nmm.model.platforms.tractor import Tractor
 from nmm.model.robots.robot import Robot
 from nmm.plugins.planning.collisions.legs_check import MARGIN
-from nmm.plugins.planning.goals import ATTEMPTS, GoalPostures, Wanted, alternatives, nothing_found
+from nmm.plugins.planning.goals import (
+    ATTEMPTS,
+    GoalPostures,
+    Wanted,
+    alternatives,
+    expect_within,
+    nothing_found,
+)
 from nmm.plugins.planning.held_motion import ROUND, HeldTiming
 from nmm.plugins.planning.holding import ARRIVED, BLOCKED, LOST, Held
 from nmm.plugins.planning.prepared import Asked
@@ -65,6 +72,7 @@ class HeldWays:
     ----------
     trees : whose ways are the platform's, and which count what was looked at
     clock : the time that is left, s
+    within (n, 2) : limits of coordinates, m and rad
     """
 
     def __init__(
@@ -74,6 +82,7 @@ class HeldWays:
         trees: Trees,
         rng: np.random.Generator,
         clock: Callable[[], float],
+        within: Array,
     ) -> None:
         self.asked, self.timing, self.trees, self.rng, self.clock = asked, timing, trees, rng, clock
         self.robot, self.held, self.check, self.guide = (
@@ -82,7 +91,7 @@ class HeldWays:
             timing.held.check,
             timing.guide,
         )
-        self._first = self.held.platform
+        self._first, self.within = self.held.platform, within
         self.low, self.high = trees.low.copy(), trees.high.copy()
         self._ended: Counter[int] = Counter()
 
@@ -113,7 +122,9 @@ class HeldWays:
 
     def poses(self, wanted: Wanted, start: Array) -> list[Array]:
         """Platform coordinates (n_p,) of those of a goal's alternatives at which the arm can hold."""
-        postures = HeldPostures(self.robot, self.low, self.high, self.check, self.asked.tolerance)
+        postures = HeldPostures(
+            self.robot, self.low, self.high, self.check, self.asked.tolerance, self.within
+        )
         postures.held, poses = self.held, []
         for goal in alternatives(wanted):
             if not isinstance(goal, Mapping) or set(goal) != {"x", "y", "theta"}:
@@ -122,6 +133,7 @@ class HeldWays:
                 raise InputError(where="plan: goal", expected=expected, got=got)
             pose = start[: self._first].copy()
             pose[:3] = self.robot.q(goal)[:3]
+            expect_within(self.robot, self.robot.q(goal), range(3), self.within)
             if postures.find(pose, start, self.rng, 1):
                 poses.append(pose)
         if poses:

@@ -24,7 +24,13 @@ from nmm.control.functions.tasks.task import Task
 from nmm.control.goal import Goal, norms, unit_codes
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
-from nmm.plugins.planning.collisions.legs_check import MovedShapes, along, leg_blocked, too_near
+from nmm.plugins.planning.collisions.legs_check import (
+    MovedShapes,
+    along,
+    leaves,
+    leg_blocked,
+    too_near,
+)
 from nmm.plugins.planning.collisions.motion_check import MotionCheck
 from nmm.plugins.planning.goals import STEPS, Newton, TaskError, newton_step
 from nmm.plugins.planning.tree import PLACE, Trees
@@ -111,7 +117,8 @@ def follow(
             if count == nodes.shape[0]:
                 ended[0] = FULL
                 return count
-            if too_near(scene, trial) >= 0 or leg_blocked(scene, current, chord) >= 0:
+            gone = planar == 1 and leaves(scene, current, chord)
+            if gone or too_near(scene, trial) >= 0 or leg_blocked(scene, current, chord) >= 0:
                 ended[0] = BLOCKED
                 return count
             share = 1.0 if step == 1.0 - share else share + step
@@ -139,19 +146,28 @@ class FollowedPath(NamedTuple):
 
 
 class Held(TaskError):
-    """What is held, where it is at a start (n,), and the arm that keeps it.
+    """What is held, where it is at a start (n,), and the arm that keeps it. within (n, 2) : its limits; the
+    robot's when not given
 
     Raises
     ------
     InputError : what is held is not where the start has it, or the arm alone cannot keep it
     """
 
-    def __init__(self, robot: Robot, hold: Task | str, q: Array, tolerance: Goal, check: MotionCheck) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        hold: Task | str,
+        q: Array,
+        tolerance: Goal,
+        check: MotionCheck,
+        within: Array | None = None,
+    ) -> None:
         if not isinstance(hold, Task | str):
             expect_kind(hold, Task, "plan: hold", "a frame's name, or a Task whose target stands")
         function = Pose(hold) if isinstance(hold, str) else hold.function
         value = evaluate(function, 0.0, Configuration(robot, q)).value
-        super().__init__(robot, Task(function, value), tolerance)
+        super().__init__(robot, Task(function, value), tolerance, within)
         self.name = hold if isinstance(hold, str) else hold.name or type(function).__name__
         if self._program.calls_python:
             raise InputError("a function computed in Python is not held", where="plan: hold")

@@ -142,7 +142,7 @@ class Plan:
         near the plan's posture with the inputs that they leave. Where the controller keeps distances, the
         plan should keep 0.05 m more: near an obstacle a controller goes slower than a plan. Limits cut each
         input by itself: one that is held, as a car's steering at its stop, does not hold the others. A pair
-        that begins near may be as near as the plan has it. A run that does not end within 5 mm and 0.02 rad
+        that begins near may be as near as the first plan has it. A run that does not end within 5 mm and 0.02 rad
         of the plan's end is missed. To step aside from what moves is for `Horizon`.
 
         Parameters
@@ -203,4 +203,5 @@ class Plan:
         (q, u), objective = self(t), self.found.asked.objective
         H = None if objective is None else SampleCosts(self.robot, objective).at(q)[0]
         constraints = self.found.limits, self.found.scene
-        return recorded(self.robot, t, q, u, dt, task, *constraints, "plan", H=H)
+        with self.found.prepared.lock:  # a Planner's plans share their scene
+            return recorded(self.robot, t, q, u, dt, task, *constraints, "plan", H=H)

@@ -153,9 +153,9 @@ def _holding(search: PlanSearch, hold: Task | str, shorten: int, begin: Callable
     """The plan along which the arm holds something."""
     robot, asked = search.robot, search.asked
     refuse_beside_hold(robot, asked)
-    held = Held(robot, hold, search.start, asked.tolerance, search.check)
+    held = Held(robot, hold, search.start, asked.tolerance, search.check, search.within)
     timing = HeldTiming(held, search.guide, search.limits, search.usual)
-    ways = HeldWays(asked, timing, search.trees, search.rng, search.left)
+    ways = HeldWays(asked, timing, search.trees, search.rng, search.left, search.within)
     begin()
     q, motions = search.start, list[SampledMotion]()
     for wanted in search.goals:
@@ -187,5 +187,6 @@ def _found(search: PlanSearch, motion: TimedMotion) -> Plan:
 
 
 def _plan(search: PlanSearch, motion: TimedMotion, motions: int, postures: int) -> Plan:
+    search.keep_asked()  # no margin, and nothing that the last part added
     result = Found(motion, search.goals[-1], search.tree, search.prepared, search.check.nearer)
     return Plan(search.robot, motions, postures, result)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from threading import RLock
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -78,7 +79,7 @@ class Planner:
             hold=hold,
         )
         self.robot = robot
-        self._prepared = Prepared(robot, asked)
+        self._prepared, self._changes = Prepared(robot, asked), RLock()
 
     def __repr__(self) -> str:
         return f"Planner({self.robot.name}, {len(self.obstacles)} obstacles)"
@@ -114,7 +115,8 @@ class Planner:
         q = self.robot.following.placed(self.robot.q(start))
         self.robot.check_limits(q)
         seconds, shorten = positive(seconds, "seconds"), counted(shorten, "shorten", 0)
-        prepared = self._prepared = self._prepared.among(self.obstacles)
+        with self._changes:
+            prepared = self._prepared = self._prepared.among(self.obstacles)
         with prepared.lock:
             return planned(PlanSearch(prepared, q, [*through, goal], seed), seconds, shorten, progress)
 
@@ -130,14 +132,15 @@ class Planner:
         ------
         InputError : a name that none of them has, a placement of other numbers, two obstacles of one name
         """
-        if isinstance(obstacles, Mapping):
-            for name in obstacles:
-                expect_known("obstacle", name, [one.name for one in self.obstacles], "update")
-            obstacles = [
-                Obstacle(one.shape, obstacles[one.name], name=one.name) if one.name in obstacles else one
-                for one in self.obstacles
-            ]
-        self._prepared = self._prepared.among(obstacles)
+        with self._changes:
+            if isinstance(obstacles, Mapping):
+                for name in obstacles:
+                    expect_known("obstacle", name, [one.name for one in self.obstacles], "update")
+                obstacles = [
+                    Obstacle(one.shape, obstacles[one.name], name=one.name) if one.name in obstacles else one
+                    for one in self.obstacles
+                ]
+            self._prepared = self._prepared.among(obstacles)
 
 
 def plan(

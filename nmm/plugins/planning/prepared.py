@@ -76,6 +76,7 @@ class Prepared:
         self.within = allowed(robot, self.limits)
         arguments = robot, speeds, pause, bool(np.all(reverses)), self.limits.coordinates
         self._ways = ways_of(*arguments, self.within)
+        self.lock = RLock()  # one for all that are made of this: costs and efforts are theirs together
         self._place(asked)
 
     def among(self, obstacles: Sequence[Obstacle]) -> Prepared:
@@ -93,7 +94,7 @@ class Prepared:
 
     def _place(self, asked: Asked) -> None:
         robot, collisions = self.robot, asked.collisions
-        self.asked, self.lock = asked, RLock()
+        self.asked = asked
         self._places = [obstacle.at(0.0) for obstacle in collisions.obstacles]
         own = len(robot.collision_model.collisionPairs) > 0
         self.scene = collisions.on(robot) if collisions.obstacles or own else None
@@ -123,6 +124,7 @@ class Prepared:
             random=np.ones(1, dtype=np.int64),
             met=np.zeros(2, dtype=np.int64),
             looked=np.zeros(2, dtype=np.int64),
+            rounds=np.zeros(1, dtype=np.int64),
         )
 
     def _lay_out(self, check: MotionCheck) -> None:

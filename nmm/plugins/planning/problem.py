@@ -13,6 +13,7 @@ from nmm.model.platforms.tractor import Tractor
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.zero_order_hold import inputs_of
 from nmm.plugins.planning.collisions.motion_check import MotionCheck
+from nmm.plugins.planning.search_space import allowed
 from nmm.plugins.planning.shooting import Shooting
 
 #: Samples' ends keep this much more than the distance, m.
@@ -65,17 +66,18 @@ def shooting_problem(
     zeros = np.zeros
     n, m, N = robot.n, robot.n_u, len(q) - 1
     hardest = np.abs(limits.changes).max(axis=1)
+    within = allowed(robot, limits)
     # Between two ends of samples a joint can go farther than at both, while it turns round.
-    room = np.minimum(q[[0, -1]] - limits.coordinates[:, 0], limits.coordinates[:, 1] - q[[0, -1]])
+    room = np.minimum(q[[0, -1]] - within[:, 0], within[:, 1] - q[[0, -1]])
     over = np.zeros(n)
     moved = robot.rate_coordinates
     over[moved[moved >= 0]] = (np.where(np.isfinite(hardest), hardest, 0.0) * step * step / 8.0)[moved >= 0]
     towed = np.setdiff1d(np.arange(robot.platform.n_p), moved)
-    over[towed[np.isfinite(limits.coordinates[towed]).any(axis=1)]] = FOLDING
+    over[towed[np.isfinite(within[towed]).any(axis=1)]] = FOLDING
     over = np.minimum(over, 0.5 * np.maximum(room.min(axis=0), 0.0))
     ends = np.vstack(
         [
-            limits.coordinates + np.column_stack([over, -over]),
+            within + np.column_stack([over, -over]),
             top,
             limits.changes,
         ]

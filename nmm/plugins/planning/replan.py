@@ -43,7 +43,7 @@ def replan(
     ----------
     plan : of `nmm.plan` or this
     q : where the robot is, (n,) or by name, m and rad
-    obstacles : that stand now, in place of all that the plan knew; as they were when None
+    obstacles : that stand now, in place of all that the plan knew; these where they are now when None
     t : how much of the plan is gone, s; that of its point nearest to q when None
     seconds, seed, shorten, progress : as of `nmm.plan`; a plan that is kept is not shortened
 
@@ -82,7 +82,7 @@ def replan(
         raise InputError(what, where="replan: obstacles", expected="nmm.Horizon, which steps aside")
     prepared = old.prepared.among(obstacles)
     with prepared.lock:
-        search = PlanSearch(prepared, start, [old.goal], seed)
+        search = PlanSearch(prepared, start, [old.goal], seed, "replan: q")
         search.begin(positive(seconds, "seconds"), progress)
         return _joined(search, plan, t, counted(shorten, "shorten", 0))
 

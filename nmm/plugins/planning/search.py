@@ -33,14 +33,17 @@ T = TypeVar("T")
 
 
 class PlanSearch:
-    """What one plan needs: where it begins, its goals, and what is `prepared` for it."""
+    """What one plan needs: where it begins, its goals, and what is `prepared` for it. where : the start is
+    named so in errors"""
 
     _ends: float
     asked_kept: Array
     tree: Array
 
-    def __init__(self, prepared: Prepared, start: Array, goals: Sequence[Wanted], seed: int = 0) -> None:
-        self.prepared, self.start, self.goals = prepared, start, goals
+    def __init__(
+        self, prepared: Prepared, start: Array, goals: Sequence[Wanted], seed: int = 0, where: str = "plan: start"
+    ) -> None:
+        self.prepared, self.start, self.goals, self._where = prepared, start, goals, where
         self.robot, self.asked, self.scene, self.movers, self.efforts, self.costs = (
             *(prepared.robot, prepared.asked, prepared.scene, prepared.movers),
             *(prepared.efforts, prepared.costs),
@@ -52,7 +55,7 @@ class PlanSearch:
         self.within = prepared.within
         outside = self.robot.outside(start, self.within)
         if outside:
-            raise InputError(f"outside its limits: {few([*outside.values()])}", where="plan: start")
+            raise InputError(f"outside its limits: {few([*outside.values()])}", where=where)
         self.low, self.high = drawn_within(
             self.robot, start, goals, self.asked.collisions.obstacles, self.within
         )
@@ -114,7 +117,7 @@ class PlanSearch:
             distances = scene.queries.distances(0.0, self.start, range(len(scene.names)))
             touch = [scene.words(int(k)) for k in np.flatnonzero(distances < 4.0 * MARGIN)]
             cure = "another start, or for links that may touch collisions.ignore (ignore=[(one, other)])"
-            raise InputError(f"{few(touch)} touch", where="plan: start", expected=cure)
+            raise InputError(f"{few(touch)} touch", where=self._where, expected=cure)
 
     def shortened(self, start: Array, legs: Array, rounds: int) -> Array:
         """Shorter legs from a configuration."""
@@ -122,7 +125,8 @@ class PlanSearch:
         return self.guide.shortened(start, legs, rounds, arm)
 
     def blocked(self, start: Array, legs: Array) -> int:
-        """The number of a pair that comes too near on legs from a free configuration, or -1; counted."""
+        """The number of a pair that comes too near on legs from a free configuration, their number where the
+        platform leaves where it stays, or -1; counted."""
         self.trees.looked[0] += 1
         return self.check.blocked(start, legs)
 
@@ -163,6 +167,7 @@ class PlanSearch:
             trees.nodes[k, :count] = [*roots, *chain]
             trees.parents[k, : len(roots)] = -1
             trees.parents[k, len(roots) : count] = [0, *range(len(roots), count - 1)][: len(chain)]
+        trees.rounds[:] = 0
         scratch, looked = np.zeros((LEGS, 3 + self.robot.n)), int(trees.looked[0])
         while True:
             outcome = self._search(*self.check.blocks, ROUNDS, scratch)

@@ -87,5 +87,6 @@ def drawn_within(
                     points.append(robot.q(goal)[:2])
         around = AROUND + 2.0 * robot.reach
         low[:2], high[:2] = np.min(points, axis=0) - around, np.max(points, axis=0) + around
-        low[2], high[2] = -np.pi, np.pi
+        middle = start[2] if np.isfinite(within[2]).any() else 0.0
+        low[2], high[2] = middle - np.pi, middle + np.pi
     return np.maximum(low, within[:, 0]), np.minimum(high, within[:, 1])

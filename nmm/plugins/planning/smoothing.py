@@ -19,6 +19,7 @@ from nmm.plugins.planning.interior import SHOOT, shoot
 from nmm.plugins.planning.objective import SampleCosts
 from nmm.plugins.planning.problem import MU, largest_inputs, shooting_problem, steps_within
 from nmm.plugins.planning.samples import MotionSamples, SampledMotion
+from nmm.plugins.planning.search_space import allowed
 from nmm.plugins.planning.shooting import LOOK, Shooting, first_blocked_sample
 
 #: How many samples a motion has: one for each so many seconds of the path's time, within limits.
@@ -187,7 +188,7 @@ class Smoothing:
             [(samples.begin[:-1, np.newaxis] + turns)[inside], np.linspace(0.0, motion.duration, 4 * N + 1)]
         )
         q, _, q_dot = motion.moving(np.sort(t))
-        low, high = limits.coordinates.T
+        low, high = allowed(self.robot, limits).T
         if np.any(q < low) or np.any(q > high):
             return False
         names, turning = turning_wheels(self.robot, q, q_dot)

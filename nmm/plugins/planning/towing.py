@@ -20,6 +20,7 @@ from nmm.model.robots.zero_order_hold import inputs_of
 from nmm.plugins.planning.collisions.motion_check import MotionCheck
 from nmm.plugins.planning.objective import SampleCosts
 from nmm.plugins.planning.samples import SampledMotion
+from nmm.plugins.planning.search_space import allowed
 from nmm.plugins.planning.smoothing import Smoothing
 from nmm.plugins.planning.trailers import DRIVEN, SEARCH, SPACING, TRACE, Trains, search_trains, trace
 from nmm.plugins.planning.tree import MODULUS
@@ -124,7 +125,7 @@ class Towing:
         self.smoothing = Smoothing(robot, limits, usual, check, costs)
         self.motions = self.configurations = 0
         n, count = robot.n, len(self.tractor.trailers)
-        folds = limits.coordinates[3 : 3 + count]
+        folds = allowed(robot, limits)[3 : 3 + count]
         radius = least_radius(self.tractor, folds)
         train = sum(abs(trailer.hitch) + trailer.length for trailer in self.tractor.trailers)
         around = np.array([AROUND * train, AROUND * train, 0.0])

@@ -50,6 +50,7 @@ class Trees(NamedTuple):
     roots (2,) : how many of them are roots
     random (1,) : the last random number; met (2,) : the two that are connected; looked (2,) : motions and
     configurations looked at
+    rounds (1,) : of the search that goes on
     """
 
     ways: Ways
@@ -63,6 +64,7 @@ class Trees(NamedTuple):
     random: IntegerVector
     met: IntegerVector
     looked: IntegerVector
+    rounds: IntegerVector
 
 
 #: Where the record lies: after the shapes'.
@@ -155,30 +157,32 @@ def grow(
 
 @compiled_without_gil
 def search(integers: Integers, floats: Array, rounds: int, legs: Array) -> int:
-    """Grow the trees for so many rounds, or until they meet (1); 0 where they have not, -1 where there is no
-    room."""
+    """Grow the trees until they meet (1), or their rounds are a multiple of these (0); -1 where there is no
+    room. What comes of more calls does not depend on the room that there was in each."""
     scene = views(MovedShapes, integers, floats, 0)
     trees = views(Trees, integers, floats, PLACE)
     n = trees.low.shape[0]
     q = scratch(n)
-    for k in range(rounds):
-        tree = k % 2
+    target = scratch(n)
+    while max(trees.counts[0], trees.counts[1]) + SPARE < trees.parents.shape[1]:
+        tree = trees.rounds[0] % 2
+        trees.rounds[0] += 1
         draw_configuration(trees, scene.planar[()], scene.mimic_joints, q)
-        if max(trees.counts[0], trees.counts[1]) + SPARE >= trees.parents.shape[1]:
-            return -1
-        if grow(scene, integers, floats, trees, tree, q, legs) < 0:
-            continue
-        new, target = trees.counts[tree] - 1, scratch(n)
-        for _ in range(100):
-            copied(trees.nodes[tree, new], target)
-            status = grow(scene, integers, floats, trees, 1 - tree, target, legs)
-            if status != 0:
-                break
-        if status == 1:
-            trees.met[tree] = new
-            trees.met[1 - tree] = trees.counts[1 - tree] - 1
-            return 1
-    return 0
+        status = grow(scene, integers, floats, trees, tree, q, legs)
+        new = trees.counts[tree] - 1
+        if status >= 0:
+            for _ in range(100):
+                copied(trees.nodes[tree, new], target)
+                status = grow(scene, integers, floats, trees, 1 - tree, target, legs)
+                if status != 0:
+                    break
+            if status == 1:
+                trees.met[tree] = new
+                trees.met[1 - tree] = trees.counts[1 - tree] - 1
+                return 1
+        if trees.rounds[0] % rounds == 0:
+            return 0
+    return -1
 
 
 SEARCH = int64(*BLOCKS.types, int64, float64[:, ::1])

@@ -203,7 +203,7 @@ def ways_of(
     """
     steers = robot.q_limits if within is None else within
     widest = tuple(steers[3].tolist()) if robot.platform.n_p == 4 else (0.0, 0.0)
-    kind, radius, rolling, steering, wheelbase = _of_platform(robot, reverses, *widest)
+    kind, radius, rolling, steering, wheelbase = _of_platform(robot, reverses, within is None, *widest)
     return Ways(
         kind=np.array(kind, dtype=np.int64),
         radius=np.array(radius),
@@ -219,10 +219,10 @@ def ways_of(
 
 @lru_cache(maxsize=8)
 def _of_platform(
-    robot: Robot, reverses: bool, right: float, left: float
+    robot: Robot, reverses: bool, of_file: bool, right: float, left: float
 ) -> tuple[int, float, Array, int, float]:
     """Kind, radius, rolling, steering and wheelbase of a robot's `Ways`; a car's steering angle is within
-    [right, left], rad."""
+    [right, left], rad; of_file : whether these are the robot's own."""
     platform = robot.platform
     kind, radius, rolling, steering, wheelbase = STANDS, 1.0, np.zeros(3), -1, 0.0
     if platform.n_p >= 3:
@@ -247,7 +247,7 @@ def _of_platform(
             steering, wheelbase = 3, axle.pivots[0].x
             if not right < 0.0 < left:
                 raise InputError(
-                    where=f"plan: limits: {robot.q_names[3]}",
+                    where=f"{robot.name if of_file else 'plan: limits'}: {robot.q_names[3]}",
                     expected="[lower, upper] about 0",
                     got=[right, left],
                 )

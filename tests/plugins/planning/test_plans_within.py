@@ -33,6 +33,23 @@ def test_what_is_outside_is_refused(start, goal, where):
         nmm.plan(nmm.load("unicycle_3r"), start, goal, limits=limits())
 
 
+@pytest.mark.parametrize("goal", [{"x": 2.0, "q1": 1.5}, [{"q1": 1.5}, {"x": 2.0}]])
+def test_a_coordinate_of_a_goal_outside_is_named(goal):
+    with pytest.raises(nmm.InputError, match="q1 = 1.5"):
+        nmm.plan(nmm.load("unicycle_3r"), {}, goal, limits=limits())
+
+
+def test_a_platform_turns_within_limits_beyond_half_a_turn():
+    wall = nmm.Obstacle(nmm.Box([0.2, 4.0, 2.0]), [3.0, 0.0, 0.5], name="wall")
+    asked = limits(theta=[4.0, 5.0])
+    try:
+        plan = nmm.plan(nmm.load("unicycle_3r"), {"theta": 4.5}, {"x": 6.0, "theta": 4.5}, [wall], None, asked, 2.0)
+    except nmm.RunError as error:  # it can hardly go sideways
+        assert "configurations" in str(error)
+    else:
+        assert np.all(np.abs(coordinates(plan, "theta") - 4.5) <= 0.5 + 1e-9)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_a_platform_stays_in_its_lane(seed):
     """Where it has to turn round and arcs would lead out; x, y and theta by the sum of its inputs, too."""
@@ -107,5 +124,5 @@ def test_a_plan_of_no_length_is_a_plan(name, tmp_path):
     controller = nmm.Controller(robot, plan.reference(), nmm.ProjectedGradient())
     followed = nmm.simulate(controller, robot.rest, 1.0, 0.02)
     assert followed.complete
-    assert codes(followed) == []
+    assert not codes(followed)
     np.testing.assert_array_equal(followed.q[-1], robot.rest)

@@ -100,7 +100,7 @@ class MotionCheck:
         if self.scene is not None:
             for names, kept in zip(self.scene.names, self.kept.tolist(), strict=True):
                 if kept < self.scene.distance:
-                    pairs[names] = min(kept - MARGIN, pairs.get(names, np.inf))
+                    pairs[names] = min(max(kept - MARGIN, 0.0), pairs.get(names, np.inf))
         return pairs
 
     @property
@@ -123,7 +123,8 @@ class MotionCheck:
         return int(self._near(self.blocks, q))
 
     def blocked(self, q: Array, legs: Array) -> int:
-        """The number of a pair that comes too near on legs (L, 3 + n) from q (n,), which is free, or -1."""
+        """The number of a pair that comes too near on legs (L, 3 + n) from q (n,), which is free,
+        their number where the platform leaves where it stays, or -1."""
         return int(self._blocked(*self.blocks, q, legs, len(legs), np.empty_like(q)))
 
 
