@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from nmm.model.collisions.shapes import Shape, hull
 CELL = 0.05
 #: The box around all of it is larger by this, m, or this share of its longest edge.
 THIN = 1e-4
+_MAKING = Lock()
 
 
 class Elements(Shape):
@@ -47,6 +49,7 @@ class Elements(Shape):
         expect(shaped, "elements: centres", "shape (N, 3)", self.centres)
         expect(len(self.centres), "elements: centres", "at least one point")
         self.radius = scalar(radius, "elements: radius", least=0.0)
+        self._cells: Cells | None = None
         self.halves: Array | None = None
         if halves is not None:
             self.halves = np.broadcast_to(array(halves, "elements: halves"), self.centres.shape)
@@ -70,10 +73,15 @@ class Elements(Shape):
         low, high = (self.centres - halves).min(axis=0), (self.centres + halves).max(axis=0)
         return low - self.radius, high + self.radius
 
-    @cached_property
+    @property
     def cells(self) -> Cells:
-        """Its elements by cells, and the field of bounds; made when first asked for."""
-        return sorted_cells(self.centres, self.halves, self.cell, self.corner, self.inside)
+        """Its elements by cells, and the field of bounds; made when first asked for, and always the same."""
+        if self._cells is None:
+            with _MAKING:  # records have their addresses: a second thread is not to replace them
+                if self._cells is None:
+                    made = sorted_cells(self.centres, self.halves, self.cell, self.corner, self.inside)
+                    self._cells = made
+        return self._cells
 
     def contains(self, point: Array) -> bool:
         """Whether a point (3,), m, is in a box or inside of what is full; points contain nothing."""
