@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from nmm.base.arrays import Array, Flags, array, positive, scalar, unwritable
+from nmm.base.arrays import Array, Flags, array, positive, scalar, unwritable, vector
 from nmm.base.errors import InputError, expect
 from nmm.model.collisions.elements.cell_mesh import cell_mesh
 from nmm.model.collisions.elements.cells import Cells, sorted_cells
@@ -53,10 +53,10 @@ class Elements(Shape):
         self.halves: Array | None = None
         if halves is not None:
             self.halves = np.broadcast_to(array(halves, "elements: halves"), self.centres.shape)
-        edges = array(cell, "elements: cell")
-        self.cell = np.array([positive(edge, "elements: cell") for edge in np.broadcast_to(edges, 3)])
+        edges = vector(cell, 3, "elements: cell")
+        self.cell = np.array([positive(edge, "elements: cell") for edge in edges])
         least = self.centres.min(axis=0)
-        self.corner = least if corner is None else array(corner, "elements: corner")
+        self.corner = least if corner is None else vector(corner, 3, "elements: corner")
         self.inside = None if inside is None else array(inside, "elements: inside").reshape(-1, 3)
         if self.halves is not None:
             index = np.floor((self.centres - self.corner) / self.cell)

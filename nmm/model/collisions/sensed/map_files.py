@@ -51,7 +51,7 @@ def read_map(file: str | Path) -> SeenMap:
         keys = yaml.safe_load(read_bytes(path, LONGEST).decode("utf-8"))
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or one_line(str(error))}", where=file) from None
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
+    except (ValueError, RecursionError, yaml.YAMLError) as error:
         raise InputError(f"is no YAML: {one_line(str(error))}", where=file) from None
     if not isinstance(keys, dict):
         raise InputError(where=file, expected=f"the keys {', '.join(REQUIRED)}", got=keys)
