@@ -58,7 +58,7 @@ def _swept(scene: Scene, t: Array, q: Array, u: Array, obstacles: tuple[Obstacle
     pairs: Integers = np.full(len(t), -1)
     for k, (time, place) in enumerate(zip(t, q, strict=True)):
         clearance[k], pairs[k] = queries.nearest(float(time), place)
-        if pairs[k] >= 0:
+        if pairs[k] >= 0 and np.any(queries.results[pairs[k], 1:4]):  # no normal: a bound, without points
             points[k] = queries.results[pairs[k], 4:]
     between, between_pairs, shifted = clearance.copy(), pairs.copy(), shifts(obstacles, t)
     for k in range(len(t) - 1):

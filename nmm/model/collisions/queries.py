@@ -176,11 +176,12 @@ class Queries:
         else:
             self._pair(self.blocks, self.places, self.results, pair, reach)
 
-    def distances(self, t: float, q: Array, pairs: Sequence[int]) -> Array:
-        """Of some pairs at (t, q), (len(pairs),), m."""
+    def distances(self, t: float, q: Array, pairs: Sequence[int], reach: float | None = None) -> Array:
+        """Of some pairs at (t, q), (len(pairs),), m; to what was sensed a lower bound from `reach`, m, on, or
+        from the band on."""
         self.place(t, q)
         for k in pairs:
-            self._compute(int(k), float(self.scene.band[()]))
+            self._compute(int(k), float(self.scene.band[()]) if reach is None else reach)
         return self.results[list(pairs), 0]
 
     def inside(self, pair: int) -> bool:

@@ -210,6 +210,10 @@ def hull(points: Array) -> Any:
     return _hull(points.tobytes())
 
 
+#: Hulls of so many points, as of the box around a cloud, are made faster than they are read.
+FEW = 8
+
+
 @lru_cache(maxsize=256)
 def _hull(data: bytes) -> Any:
     points = np.frombuffer(data).reshape(-1, 3)
@@ -222,6 +226,8 @@ def _hull(data: bytes) -> Any:
 
 def _kept(name: str, points: Array) -> tuple[Array, Integers]:
     """Corners (V, 3) and triangles (F, 3) of the hull, from the cache if they are there."""
+    if len(points) <= FEW:
+        return _made(points)
     path = Path(platformdirs.user_cache_dir("nmm")) / "hulls" / f"{name}.convex"
     data = disk_cache.read(path)
     if data is not None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from functools import cached_property
+from threading import Lock
 from typing import Any
 
 import numpy as np
 
-from nmm.base.arrays import Array, Flags, array, positive, scalar, unwritable
+from nmm.base.arrays import Array, Flags, array, positive, scalar, unwritable, vector
 from nmm.base.errors import InputError, expect
 from nmm.model.collisions.elements.cell_mesh import cell_mesh
 from nmm.model.collisions.elements.cells import Cells, sorted_cells
@@ -17,6 +18,7 @@ from nmm.model.collisions.shapes import Shape, hull
 CELL = 0.05
 #: The box around all of it is larger by this, m, or this share of its longest edge.
 THIN = 1e-4
+_MAKING = Lock()
 
 
 class Elements(Shape):
@@ -47,13 +49,14 @@ class Elements(Shape):
         expect(shaped, "elements: centres", "shape (N, 3)", self.centres)
         expect(len(self.centres), "elements: centres", "at least one point")
         self.radius = scalar(radius, "elements: radius", least=0.0)
+        self._cells: Cells | None = None
         self.halves: Array | None = None
         if halves is not None:
             self.halves = np.broadcast_to(array(halves, "elements: halves"), self.centres.shape)
-        edges = array(cell, "elements: cell")
-        self.cell = np.array([positive(edge, "elements: cell") for edge in np.broadcast_to(edges, 3)])
+        edges = vector(cell, 3, "elements: cell")
+        self.cell = np.array([positive(edge, "elements: cell") for edge in edges])
         least = self.centres.min(axis=0)
-        self.corner = least if corner is None else array(corner, "elements: corner")
+        self.corner = least if corner is None else vector(corner, 3, "elements: corner")
         self.inside = None if inside is None else array(inside, "elements: inside").reshape(-1, 3)
         if self.halves is not None:
             index = np.floor((self.centres - self.corner) / self.cell)
@@ -70,10 +73,15 @@ class Elements(Shape):
         low, high = (self.centres - halves).min(axis=0), (self.centres + halves).max(axis=0)
         return low - self.radius, high + self.radius
 
-    @cached_property
+    @property
     def cells(self) -> Cells:
-        """Its elements by cells, and the field of bounds; made when first asked for."""
-        return sorted_cells(self.centres, self.halves, self.cell, self.corner, self.inside)
+        """Its elements by cells, and the field of bounds; made when first asked for, and always the same."""
+        if self._cells is None:
+            with _MAKING:  # records have their addresses: a second thread is not to replace them
+                if self._cells is None:
+                    made = sorted_cells(self.centres, self.halves, self.cell, self.corner, self.inside)
+                    self._cells = made
+        return self._cells
 
     def contains(self, point: Array) -> bool:
         """Whether a point (3,), m, is in a box or inside of what is full; points contain nothing."""

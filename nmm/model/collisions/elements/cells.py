@@ -42,12 +42,14 @@ def sorted_cells(
     everywhere = centres if inside is None or not len(inside) else np.vstack([centres, inside])
     first = np.floor((everywhere.min(axis=0) - corner) / cell)
     corner, edge, times = corner + first * cell, cell, 1
+    wide = everywhere.max(axis=0) - corner
     while True:
-        last = np.floor((everywhere.max(axis=0) - corner) / edge)
+        last = np.floor(wide / edge)
         counts = last.astype(np.int64) + 1
-        if float(np.prod(last + 1.0)) <= MOST:
+        excess = float(np.prod(last + 1.0)) / MOST
+        if excess <= 1.0:
             break
-        times += 1
+        times = max(times + 1, int(times * np.cbrt(excess)))
         edge = cell * times
     if times > 1 and inside is not None and halves is not None and len(inside):
         # In larger cells those inside are elements, too: a cell may hold both.

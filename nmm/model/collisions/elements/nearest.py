@@ -161,7 +161,8 @@ def near_distance(
                         x, y, z = pose[k], pose[3 + k], pose[6 + k]
                         out[k] = x * now[0] + y * now[1] + z * now[2]
                         out[3 + k] = pose[9 + k] + x * now[3] + y * now[4] + z * now[5]
-    return best - lattice[6]
+    # The sum's rounding is not undone by taking the radius off.
+    return best - lattice[6] if best < reach + lattice[6] else reach
 
 
 @compiled

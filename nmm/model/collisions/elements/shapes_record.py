@@ -101,6 +101,8 @@ def _described(geometry: Any) -> tuple[int, Array, Array, tuple[float, float], A
         return ROUND, box, np.zeros(3), (float(geometry.radius), float(geometry.halfLength)), none
     if isinstance(geometry, coal.Cylinder):
         return DISC, box, np.zeros(3), (float(geometry.radius), float(geometry.halfLength)), none
+    if not isinstance(geometry, coal.ConvexBase):  # an ellipsoid, a cone: the box around it
+        return BOX, box, box[:3].copy(), (0.0, 0.0), none
     points = np.array(geometry.points()).reshape(-1, 3)
     return HULL, box, points.mean(axis=0), (0.0, 0.0), points
 

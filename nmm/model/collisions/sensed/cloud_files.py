@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import warnings
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -53,17 +52,18 @@ def _ply(content: bytes) -> Any:
 
 def _npz(content: bytes) -> Any:
     try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as file:
-            if not hasattr(file, "files"):
-                raise InputError("it is a single array", expected="an archive made by np.savez")
+        loaded = np.load(io.BytesIO(content), allow_pickle=False)
+        if not hasattr(loaded, "files"):
+            raise InputError("it is a single array", expected="an archive made by np.savez")
+        with loaded as file:
             names = file.files
             name = "points" if "points" in names else names[0] if len(names) == 1 else None
             if name is None:
                 raise InputError(expected="the array points, or a single one", available=names)
             points = file[name]
-    except (ValueError, zipfile.BadZipFile, EOFError, KeyError) as error:
-        if isinstance(error, InputError):
-            raise
+    except InputError:
+        raise
+    except Exception as error:  # zlib's and zipfile's own among them
         raise InputError(f"damaged, or no NPZ ({one_line(str(error))})") from None
     if points.dtype.kind not in "fiu":
         raise InputError(where=name, expected="numbers", got=str(points.dtype))
@@ -91,12 +91,12 @@ def _pcd(content: bytes) -> Any:
         named = [
             (f"{name}_{i}", *rest) for i, (name, *rest) in enumerate(zip(fields, types, counts, strict=True))
         ]
-    except (KeyError, ValueError, IndexError) as error:
+        layout = np.dtype([(name, kind, (count,)) for name, kind, count in named])
+    except (KeyError, ValueError, IndexError, OverflowError) as error:
         raise InputError(f"its header is no PCD's ({type(error).__name__}: {one_line(str(error))})") from None
     missing = [axis for axis in "xyz" if axis not in fields]
     if missing or total < 0 or any(count < 1 for count in counts):
         raise InputError(where="FIELDS", expected="x, y and z, and counts above 0", got=fields)
-    layout = np.dtype([(name, kind, (count,)) for name, kind, count in named])
     columns = [fields.index(axis) for axis in "xyz"]
     form = " ".join(header["DATA"])
     if form == "ascii":

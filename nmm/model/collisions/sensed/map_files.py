@@ -51,7 +51,7 @@ def read_map(file: str | Path) -> SeenMap:
         keys = yaml.safe_load(read_bytes(path, LONGEST).decode("utf-8"))
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or one_line(str(error))}", where=file) from None
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
+    except (ValueError, RecursionError, yaml.YAMLError) as error:
         raise InputError(f"is no YAML: {one_line(str(error))}", where=file) from None
     if not isinstance(keys, dict):
         raise InputError(where=file, expected=f"the keys {', '.join(REQUIRED)}", got=keys)
@@ -121,11 +121,15 @@ def read_image(file: Path) -> Image:
             file_image.load()
             image: PIL.Image.Image = file_image
             most, alpha = 255, "A" in image.getbands() or "transparency" in image.info
-            if image.mode in ("1", "P", "PA", "LA", "CMYK") or (alpha and image.mode == "L"):
+            deep = image.mode.startswith("I")
+            if image.mode in ("1", "P", "PA", "LA", "CMYK") or (alpha and not deep and image.mode != "RGBA"):
                 image = image.convert("RGBA" if alpha else "RGB")
-            if image.mode.startswith("I"):
-                most = 65535
             values = np.asarray(image)
+            if deep:
+                most = 65535
+            if deep and alpha:  # pillow converts no grey of 16 bits
+                opacity = np.where(values == image.info["transparency"], 0, most)
+                values = np.stack([values, opacity], axis=2)
     except Exception as error:  # pillow's readers raise whatever they meet
         what = f"is damaged, or no PGM, PNG or BMP ({type(error).__name__}: {one_line(str(error))})"
         raise InputError(what, where=f"image {file}") from None

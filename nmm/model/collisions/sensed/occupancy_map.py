@@ -144,7 +144,6 @@ class OccupancyMap(Obstacle):
 
     def cell_of(self, x: float, y: float) -> tuple[int, int]:
         """Row and column of the cell in which a point of the world is, m; they may be outside of the map."""
-        a, b, yaw = self.origin
-        c, s = math.cos(yaw), math.sin(yaw)
-        along, across = c * (x - a) + s * (y - b), c * (y - b) - s * (x - a)
+        place = self.at(0.0)
+        along, across, _ = place.actInv(np.array([x, y, place.translation[2]])).tolist()
         return math.floor(across / self.resolution), math.floor(along / self.resolution)

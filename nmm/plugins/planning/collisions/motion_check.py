@@ -83,9 +83,9 @@ class MotionCheck:
         least = np.asarray(np.min([measure(q, enough) for q in configurations], axis=0))
         sensed = np.flatnonzero(self._shapes.sensed.row[self.pairs[:, 1]] >= 0)
         if len(sensed):  # of these Coal knows the box around all
-            least[sensed] = np.min(
-                [scene.queries.distances(0.0, q, sensed.tolist()) for q in configurations], axis=0
-            )
+            queries, pairs = scene.queries, sensed.tolist()
+            reach = max(float(queries.scene.band[()]), enough)
+            least[sensed] = np.min([queries.distances(0.0, q, pairs, reach) for q in configurations], axis=0)
         return least
 
     @property

@@ -80,7 +80,8 @@ def cloud(message: Any, radius: float = 0.01, name: str = "") -> PointCloud:
         kind, offset = _TYPES.get(int(fields[axis].datatype)), int(fields[axis].offset)
         expect(kind, f"{where}: fields: {axis}: datatype", "1 to 8", int(fields[axis].datatype))
         number = np.dtype(f"{order}{kind}")
-        expect(offset + number.itemsize <= step, f"{where}: fields: {axis}: offset", "within a point", offset)
+        fits = 0 <= offset <= step - number.itemsize
+        expect(fits, f"{where}: fields: {axis}: offset", "within a point", offset)
         columns.append(np.ndarray((height, width), number, data, offset, (pitch, step)).ravel())
     return PointCloud(np.column_stack(columns).astype(np.float64), radius, name)
 
