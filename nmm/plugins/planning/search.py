@@ -41,7 +41,12 @@ class PlanSearch:
     tree: Array
 
     def __init__(
-        self, prepared: Prepared, start: Array, goals: Sequence[Wanted], seed: int = 0, where: str = "plan: start"
+        self,
+        prepared: Prepared,
+        start: Array,
+        goals: Sequence[Wanted],
+        seed: int = 0,
+        where: str = "plan: start",
     ) -> None:
         self.prepared, self.start, self.goals, self._where = prepared, start, goals, where
         self.robot, self.asked, self.scene, self.movers, self.efforts, self.costs = (

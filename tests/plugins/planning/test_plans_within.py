@@ -5,6 +5,7 @@ import pytest
 from findings import codes
 
 import nmm
+from nmm.plugins.planning.search_space import drawn_within
 
 POSITION = {"q1": [-1.0, 1.0], "q2": [-1.0, 1.0], "y": [-0.3, 0.3]}
 
@@ -39,15 +40,14 @@ def test_a_coordinate_of_a_goal_outside_is_named(goal):
         nmm.plan(nmm.load("unicycle_3r"), {}, goal, limits=limits())
 
 
-def test_a_platform_turns_within_limits_beyond_half_a_turn():
-    wall = nmm.Obstacle(nmm.Box([0.2, 4.0, 2.0]), [3.0, 0.0, 0.5], name="wall")
-    asked = limits(theta=[4.0, 5.0])
-    try:
-        plan = nmm.plan(nmm.load("unicycle_3r"), {"theta": 4.5}, {"x": 6.0, "theta": 4.5}, [wall], None, asked, 2.0)
-    except nmm.RunError as error:  # it can hardly go sideways
-        assert "configurations" in str(error)
-    else:
-        assert np.all(np.abs(coordinates(plan, "theta") - 4.5) <= 0.5 + 1e-9)
+def test_configurations_are_drawn_within_limits_of_theta_beyond_half_a_turn():
+    robot = nmm.load("unicycle_3r")
+    start, within = robot.q({"theta": 4.5}), np.tile([-np.inf, np.inf], (robot.n, 1))
+    within[2] = 4.0, 5.0
+    low, high = drawn_within(robot, start, [{"x": 2.0}], (), within)
+    assert (low[2], high[2]) == (4.0, 5.0)
+    plan = nmm.plan(robot, {"theta": 4.5}, {"q1": 0.5}, limits=limits(theta=[4.0, 5.0]))
+    assert np.allclose(plan.end[2], 4.5)
 
 
 @pytest.mark.parametrize("seed", range(5))
