@@ -99,7 +99,8 @@ def place_shape(scene: MovedShapes, joints: Array, shape: int) -> None:
 @compiled
 def placed_bound(scene: MovedShapes, pair: int, enough: float, least: float) -> float:
     """A lower bound of the distance of a pair where its shapes were placed; rough above `enough`, and above
-    `least` as `separation` is."""
+    `least` as `separation` is. Where that is nan, the direction is asked for: it follows a pair from farther
+    away."""
     shapes, places, centres = scene.shapes, scene.places, scene.centres
     i, j = shapes.pairs[pair, 0], shapes.pairs[pair, 1]
     if j < shapes.planes[()]:
@@ -113,7 +114,9 @@ def placed_bound(scene: MovedShapes, pair: int, enough: float, least: float) -> 
             outside = max(abs(off) - shapes.boxes[j, 3 + axis], 0.0)
             beyond += outside * outside
         # Between the balls around both, and between the first one's and the second one's box.
-        apart = max(math.sqrt(square) - shapes.boxes[j, 6], math.sqrt(beyond)) - shapes.boxes[i, 6]
+        apart = math.sqrt(square) - shapes.boxes[j, 6] - shapes.boxes[i, 6]
+        if not math.isnan(least):
+            apart = max(apart, math.sqrt(beyond) - shapes.boxes[i, 6])
         if apart >= enough:
             return apart
     if scene.sensed.row[j] >= 0:
