@@ -142,8 +142,8 @@ class Plan:
         near the plan's posture with the inputs that they leave. Where the controller keeps distances, the
         plan should keep 0.05 m more: near an obstacle a controller goes slower than a plan. Limits cut each
         input by itself: one that is held, as a car's steering at its stop, does not hold the others. A pair
-        that begins near may be as near as the first plan has it. A run that does not end within 5 mm and 0.02 rad
-        of the plan's end is missed. To step aside from what moves is for `Horizon`.
+        that begins near may be as near as the first plan has it. A run that does not end within 5 mm and
+        0.02 rad of the plan's end is missed. To step aside from what moves is for `Horizon`.
 
         Parameters
         ----------

@@ -100,13 +100,13 @@ def test_a_search_that_fills_its_first_room_goes_on(robot, monkeypatch):
 
 @pytest.mark.parametrize(("height", "near"), [(0.02, 0.0175), (0.001, 0.0)])
 def test_what_begins_near_may_be_as_near_whatever_margin_and_parts(robot, height, near):
-    """A plate beside the arm, nearer than the distance to keep: less what is looked at roughly, 5 in 10000 m."""
+    """A plate beside the arm, nearer than the distance to keep: less what is looked at roughly, 0.5 mm."""
     q = robot.q(START)
     plate = nmm.Obstacle(nmm.Box([0.1, 0.1, 0.1]), [-3.0, 0.0, 0.5], name="plate")
     for _ in range(60):
         scene = nmm.Collisions(obstacles=[plate]).on(robot)
         apart = scene.queries.distances(0.0, q, range(len(scene.names))).min()
-        plate.move_to(plate.at(0.0).translation + [apart - height, 0.0, 0.0])
+        plate.move_to(plate.at(0.0).translation + np.array([apart - height, 0.0, 0.0]))
     for options in ({}, {"margin": 0.1}):
         planner = nmm.Planner(robot, [plate], limits=LIMITS, **options)
         for through in ((), [{"x": 1.0, "y": 1.0}]):
