@@ -96,9 +96,9 @@ def test_a_robot_that_touches_a_cloud_or_stands_in_a_map_is_told_so() -> None:
 
 
 def test_all_of_a_distance_is_kept_of_a_cloud_in_a_narrow_band() -> None:
-    """As of a box: `keep` and `widen` look beyond the band where there is room."""
+    """`keep` and `widen` look beyond the band where there is room; in one large cell nothing else says so."""
     robot = nmm.load("unicycle_3r")
-    far = nmm.PointCloud([[3.0, 0.0, 0.3]], name="far")
+    far = nmm.PointCloud([[3.0, 0.0, 0.3], [-3.0, 0.0, 0.3]], name="far", cell=7.0)
     scene = nmm.Collisions(0.03, self_collisions=False, obstacles=[far], band=0.031).on(robot)
     check = MotionCheck(robot, scene)
     check.keep(robot.rest[None])
