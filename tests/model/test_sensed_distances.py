@@ -288,6 +288,38 @@ def test_gradients_of_a_wall_of_voxels_do_not_jump_at_its_cells() -> None:
         assert np.abs(normals - [-1.0, 0.0, 0.0]).max() < 1e-4, name
 
 
+@pytest.mark.parametrize("radius", [0.005, 0.011, 0.012, 0.026, 0.051])
+def test_where_nothing_is_within_reach_no_bound_is_below_it(radius: float) -> None:
+    """Far from the grid's own bound: two points in one large cell, the shape between them."""
+    cloud = nmm.PointCloud([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]], radius, cell=3.0)
+    at = pin.SE3(np.eye(3), np.array([1.0, 0.0, 0.0]))
+    for name in ("sphere", "box", "hull"):
+        pair = Pair(SHAPES[name], cloud)
+        for reach in (0.02, 0.03, 0.05, 0.1):
+            assert pair.bound(at, reach, reach)[0] >= reach
+            assert pair.measure(at, reach)[0] >= reach
+
+
+@pytest.mark.parametrize(
+    "geometry", [coal.Ellipsoid(0.2, 0.1, 0.3), coal.Cone(0.15, 0.5)], ids=["egg", "cone"]
+)
+def test_what_has_no_distance_of_its_own_is_the_box_around_it(geometry: Any) -> None:
+    rng = np.random.default_rng(19)
+    points = room(2000, rng)
+    pair = Pair(geometry, nmm.PointCloud(points, 0.01))
+    checked = 0
+    for at in poses(rng, 40):
+        near = points[np.linalg.norm(points - at.translation, axis=1) < 0.95]
+        exact = min([0.4, *(apart(geometry, at, coal.Sphere(1e-9), point) for point in near)]) - 0.01
+        d = pair.measure(at, 0.3)[0]
+        checked += 0.0 < d < 0.3
+        if exact < 0.39:  # farther points were left out
+            assert d <= max(exact, 0.0) + 1e-6
+        # No point of the box is farther from the shape than its half diagonal.
+        assert d >= min(exact, 0.3) - np.linalg.norm(geometry.aabb_local.max_) - 1e-6
+    assert checked > 5
+
+
 def test_kernels_run_as_plain_python_too() -> None:
     rng = np.random.default_rng(17)
     cloud = nmm.PointCloud(room(300, rng), 0.01)

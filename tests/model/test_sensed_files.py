@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import struct
 import subprocess
 import sys
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import coal
@@ -83,6 +85,18 @@ def test_an_npz_has_its_points_and_holds_no_objects(tmp_path: Path) -> None:
         nmm.PointCloud.load(tmp_path / "c.npz")
 
 
+def written(save: Callable[..., None]) -> bytes:
+    """What NumPy writes of the points."""
+    content = io.BytesIO()
+    save(content, POINTS)
+    return content.getvalue()
+
+
+def spoilt(content: bytes) -> bytes:
+    """With bytes in the middle that no stream of zlib has."""
+    return content[:100] + b"\xff" * 100 + content[200:]
+
+
 @pytest.mark.parametrize(
     ("name", "content", "says"),
     [
@@ -94,6 +108,9 @@ def test_an_npz_has_its_points_and_holds_no_objects(tmp_path: Path) -> None:
         ("a.pcd", pcd("ascii").replace(b"SIZE 4", b"SIZE 5"), "header"),
         ("a.ply", b"ply\nformat ascii 1.0\n", "PLY"),
         ("a.npz", b"PK\x03\x04 no archive", "NPZ"),
+        ("a.npz", written(np.save), "single array"),
+        ("a.npz", spoilt(written(np.savez_compressed)), "NPZ"),
+        ("a.pcd", pcd("ascii").replace(b"COUNT 1", b"COUNT 1000000000000"), "header"),
         ("a.xyz", b"1 2 3", r"\.ply, \.pcd or \.npz"),
         ("a.npz", None, "cannot be read"),
     ],
@@ -244,6 +261,27 @@ def test_bmp_and_palettes_are_read(tmp_path: Path) -> None:
         assert np.array_equal(read_image(tmp_path / name).values[:, :, 0], SHADES)
 
 
+@pytest.mark.parametrize("kind", ["RGB", "I;16"])
+def test_a_transparent_colour_is_opacity_and_no_channel_of_the_image(tmp_path: Path, kind: str) -> None:
+    if kind == "RGB":
+        pixels = np.array([[[255, 255, 255], [0, 0, 255], [10, 20, 30]]], dtype=np.uint8)
+        Image.fromarray(pixels).save(tmp_path / "a.png", transparency=(10, 20, 30))
+    else:
+        pixels = np.array([[65535, 0, 300]], dtype=np.uint16)
+        Image.fromarray(pixels).save(tmp_path / "a.png", transparency=300)
+    image = read_image(tmp_path / "a.png")
+    assert image.alpha
+    assert np.array_equal(image.values[..., :-1].squeeze(), pixels.squeeze())
+    assert (image.values[0, :, -1] / image.most).tolist() == [1.0, 1.0, 0.0]
+
+
+def test_a_moved_maps_cells_are_where_it_is() -> None:
+    room = nmm.OccupancyMap(np.full((4, 6), 100), 0.5, [1.0, 2.0, 0.3])
+    room.move_to([3.0, -1.0, 0.2, 0.0, 0.0, np.pi / 2])
+    centre = room.at(0.0).act(np.array([2.75, 1.25, 0.0]))
+    assert room.cell_of(centre[0], centre[1]) == (2, 5)
+
+
 def test_a_map_whose_unknown_cells_are_free_by_its_threshold_warns(tmp_path: Path) -> None:
     pixels = np.full((10, 10), 205, dtype=np.uint8)
     pixels[0, 0], pixels[5, :3] = 0, 254
@@ -263,6 +301,9 @@ def test_a_map_whose_unknown_cells_are_free_by_its_threshold_warns(tmp_path: Pat
     [
         ({"resolution": -1}, "resolution"),
         ({"origin": "[1, 2]"}, "origin"),
+        ({"origin": "2024-13-45"}, "YAML"),
+        ({"origin": "!!int x"}, "YAML"),
+        ({"origin": "[" * 5000}, "YAML"),
         ({"mode": "ternary"}, "trinary"),
         ({"negate": 2}, "negate"),
         ({"image": "none.png"}, "cannot be read"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from scanned import door, walls
 import nmm
 from nmm.base.errors import InputError
 from nmm.model.collisions.elements import Elements
+from nmm.plugins.planning.collisions.motion_check import MotionCheck
 
 GOAL = {"x": 4.0, "y": 0.6, "theta": 0.0}
 START = {"x": 0.3, "y": -0.9, "q1": 0.5}
@@ -93,6 +95,30 @@ def test_a_robot_that_touches_a_cloud_or_stands_in_a_map_is_told_so() -> None:
         nmm.simulate(controller, robot.rest, 1, 0.02, "zoh")
 
 
+def test_all_of_a_distance_is_kept_of_a_cloud_in_a_narrow_band() -> None:
+    """`keep` and `widen` look beyond the band where there is room; in one large cell nothing else says so."""
+    robot = nmm.load("unicycle_3r")
+    far = nmm.PointCloud([[3.0, 0.0, 0.3], [-3.0, 0.0, 0.3]], name="far", cell=7.0)
+    scene = nmm.Collisions(0.03, self_collisions=False, obstacles=[far], band=0.031).on(robot)
+    check = MotionCheck(robot, scene)
+    check.keep(robot.rest[None])
+    assert np.all(check.kept == 0.03)
+    assert not check.nearer
+    check.widen(robot.rest[None], 0.2)
+    assert np.allclose(check.kept, 0.23)
+
+
+def test_a_run_far_from_a_cloud_has_no_nearest_points() -> None:
+    robot = nmm.load("unicycle_3r")
+    cloud = nmm.PointCloud([[9.0, 0.0, 0.3], [9.0, 4.0, 0.3]], name="far")
+    task = nmm.Task(nmm.Position("ee", "xy"), [1.0, 0.1], speed=0.4)
+    collisions = nmm.Collisions(0.05, self_collisions=False, obstacles=[cloud])
+    controller = nmm.Controller(robot, task, nmm.DampedLeastSquares(), collisions=collisions, dt=0.02)
+    run = nmm.simulate(controller, {"q1": 0.3, "q2": 0.6}, 0.2, 0.02, "zoh")
+    assert np.all(run.clearance >= 1.0)
+    assert np.isnan(run.clearance_points).all()
+
+
 def test_a_horizon_keeps_off_a_cloud() -> None:
     robot = nmm.load("unicycle_3r")
     cloud = nmm.PointCloud(door(10_000, 3), radius=0.03, name="wall")
@@ -117,6 +143,12 @@ def test_a_run_among_a_cloud_is_saved_and_opened_with_it(tmp_path: Path) -> None
         assert np.array_equal(shape.centres, read.centres)
         assert (shape.halves is None) == (read.halves is None)
         assert shape.radius == read.radius
+    summary = tmp_path / "run" / "summary.json"
+    data = json.loads(summary.read_text())
+    data["obstacles"][0]["shape"]["cell"] = [0.05, 0.05]
+    summary.write_text(json.dumps(data))
+    with pytest.raises(InputError, match="cell"):
+        nmm.Trajectory.load(tmp_path / "run")
 
 
 def test_what_is_drawn_of_a_large_cloud_is_small_and_around_all_points() -> None:

@@ -115,6 +115,7 @@ def draw_nearest(
         return
     samples = samples_kept(motion.t, fps)
     shown = (nearest.pairs[samples] >= 0) & (nearest.distance[samples] < nearest.asked + REACH)
+    ends = np.nan_to_num(nearest.points[samples])  # none inside of a map
     if not shown.any():
         return
     drawing.add(
@@ -124,7 +125,7 @@ def draw_nearest(
         color=list(NEAR if color is None else color),
         alarm=list(TOO_NEAR),
         times=packed(motion.t[samples] - start, np.float64),
-        points=packed(np.where(shown[:, np.newaxis], nearest.points[samples], 0.0), np.float64),
+        points=packed(np.where(shown[:, np.newaxis], ends, 0.0), np.float64),
         distance=packed(np.where(shown, nearest.distance[samples], 1e9), np.float64),
         pairs=np.where(shown, nearest.pairs[samples], -1).tolist(),
         names=list(nearest.names),
