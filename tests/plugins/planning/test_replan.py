@@ -129,7 +129,7 @@ def test_an_end_that_is_taken_is_another_posture_or_refused(plans):
     [
         ({"plan": 1.0}, "replan"),
         ({"q": {"z": 1.0}}, "robot unicycle_3r"),
-        ({"q": {"x": 3.0}}, "plan: start"),
+        ({"q": {"x": 3.0}}, "replan: q"),
         ({"seconds": 0.0}, "seconds"),
         ({"t": np.nan}, "t"),
     ],

@@ -88,7 +88,7 @@ class PointCloud(Obstacle):
         return f"PointCloud({self.name}, {len(self.points)} points, radius={self.radius:g})"
 
     @property
-    def elements(self) -> Elements:
+    def _elements(self) -> Elements:
         """Its points as a shape."""
         shape: Any = self.shape
         return shape
@@ -96,12 +96,12 @@ class PointCloud(Obstacle):
     @property
     def points(self) -> Array:
         """The points (N, 3) that are finite, m, in the axes of its placement."""
-        return self.elements.centres
+        return self._elements.centres
 
     @property
     def radius(self) -> float:
         """Of the balls about the points, m."""
-        return self.elements.radius
+        return self._elements.radius
 
     @property
     def spacing(self) -> float:
