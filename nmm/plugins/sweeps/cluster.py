@@ -3,6 +3,7 @@
 import asyncio
 import logging
 from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from itertools import islice
@@ -50,7 +51,8 @@ def _check_answers(distributed: Any, address: str) -> None:
             return str((await server.identity()).get("type", ""))
 
     try:
-        node_type = asyncio.run(kind())
+        with ThreadPoolExecutor(1) as thread:  # a notebook's own thread has an event loop that runs
+            node_type = thread.submit(asyncio.run, kind()).result()
     except (OSError, TimeoutError):
         problem = f"no scheduler answers there within {PATIENCE:g} s"
         raise InputError(problem, where=f"--scheduler {address}") from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import signal
 import socket
@@ -36,9 +37,14 @@ def scheduler() -> Iterator[str]:
 
 
 def test_a_clusters_table_is_the_local_one_bit_for_bit(sweep: nmm.Sweep, tmp_path: Path) -> None:
+    """Where an event loop runs, as in a notebook's cell, too."""
+
+    async def cell(address: str) -> nmm.SweepResult:
+        return sweep.run(tmp_path / "far", scheduler=address)
+
     local = sweep.run(tmp_path / "local", jobs=1)
     with LocalCluster(n_workers=2, processes=False, dashboard_address=None) as workers:
-        far = sweep.run(tmp_path / "far", scheduler=workers.scheduler_address)
+        far = asyncio.run(cell(workers.scheduler_address))
     assert far.table.equals(local.table)
     tables = [(swept.folder / "rows.parquet").read_bytes() for swept in (local, far)]
     assert tables[0] == tables[1]
