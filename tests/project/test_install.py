@@ -53,6 +53,6 @@ def test_a_loop_imports_what_a_robot_has(pytestconfig: pytest.Config, tmp_path: 
     used = {canonicalize_name(one) for name in told for one in owners.get(name, ())} - {"nmm"}
     assert {"numpy", "llvmlite", "xacro"} < used
     used.add("numba")  # imported where something is compiled, as at the first start
-    # Where they are installed numba imports SciPy, which imports all of NumPy, whose f2py imports charset_normalizer;
-    # and Python imports setuptools at its start.
+    # Where they are installed numba imports SciPy, which imports all of NumPy, whose f2py imports
+    # charset_normalizer; and Python imports setuptools at its start.
     assert used <= robot.keys() | {"scipy", "charset-normalizer", "setuptools"}
