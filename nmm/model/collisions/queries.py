@@ -19,9 +19,11 @@ from nmm.model.collisions.broad_phase import PairArrays, find_near
 from nmm.model.collisions.elements.boxes import Elements
 from nmm.model.collisions.elements.nearest import measure_sensed
 from nmm.model.collisions.elements.shapes_record import sensed_shapes
+from nmm.model.collisions.near_rows import write_rows
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.collisions.pairs import box_around, pairs_of
-from nmm.model.collisions.rows import DistanceRows, write_row, write_rows
+from nmm.model.collisions.rows import DistanceRows, write_row
+from nmm.model.collisions.seen_rows import remember
 from nmm.model.robots.joint_table import placement_rows
 from nmm.model.robots.robot import Robot
 
@@ -56,7 +58,9 @@ def _measure_near(blocks: Blocks, places: Array, results: Array) -> None:
 @compiled
 def _row(blocks: Blocks, places: Array, J: Array, row_blocks: Blocks, place: int, slot: int) -> None:
     scene = views(PairArrays, blocks.integers, blocks.floats, 0)
-    write_row(scene, J, places, views(DistanceRows, row_blocks.integers, row_blocks.floats, place), slot)
+    rows = views(DistanceRows, row_blocks.integers, row_blocks.floats, place)
+    write_row(scene, J, places, rows, slot)
+    remember(scene, places, rows, slot)
 
 
 class Queries:

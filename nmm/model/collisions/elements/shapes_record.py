@@ -31,6 +31,7 @@ class SensedShapes(NamedTuple):
     first_ball (G + 1,), balls (..., 4) : centres and radii; together they cover a shape
     grids (C, 8) : addresses of field, starts, centres and halves (0 where all have the same), nx, ny, nz, N
     lattice (C, 10) : corner, edges of a cell, radius, halves (0 of points)
+    edition (C,) : of the elements, from 1 on: one more where others have taken their place
     """
 
     row: IntegerVector
@@ -44,6 +45,7 @@ class SensedShapes(NamedTuple):
     balls: Matrix
     grids: IntegerMatrix
     lattice: Matrix
+    edition: IntegerVector
 
 
 def sensed_shapes(geometries: Sequence[Any], obstacles: Sequence[Any], own: int) -> SensedShapes:
@@ -76,6 +78,7 @@ def sensed_shapes(geometries: Sequence[Any], obstacles: Sequence[Any], own: int)
         balls=np.concatenate([*balls, np.zeros((0, 4))]),
         grids=grids,
         lattice=lattice,
+        edition=np.ones(len(seen), dtype=np.int64),
     )
 
 
