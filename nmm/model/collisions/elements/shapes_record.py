@@ -50,7 +50,7 @@ class SensedShapes(NamedTuple):
 
 def sensed_shapes(geometries: Sequence[Any], obstacles: Sequence[Any], own: int) -> SensedShapes:
     """Of Coal's shapes, the first `own` of which are the robot's, and the shapes of the obstacles after them.
-    Without one that was sensed there is nothing in it. The caller holds the obstacles."""
+    Without one that was sensed there is nothing in it. The caller holds the shapes."""
     seen = [(own + i, shape) for i, shape in enumerate(obstacles) if isinstance(shape, Elements)]
     count = len(geometries)
     row = np.full(count, -1, dtype=np.int64)
@@ -65,7 +65,7 @@ def sensed_shapes(geometries: Sequence[Any], obstacles: Sequence[Any], own: int)
         balls[i] = covering(geometries[i])
     grids, lattice = np.zeros((len(seen), 8), dtype=np.int64), np.zeros((len(seen), 10))
     for k, (_, shape) in enumerate(seen):
-        grids[k], lattice[k] = _grid(shape)
+        grids[k], lattice[k] = grid_of(shape)
     return SensedShapes(
         row=row,
         kind=kind,
@@ -82,7 +82,8 @@ def sensed_shapes(geometries: Sequence[Any], obstacles: Sequence[Any], own: int)
     )
 
 
-def _grid(shape: Elements) -> tuple[Any, Array]:
+def grid_of(shape: Elements) -> tuple[Any, Array]:
+    """A row of `grids` and one of `lattice`."""
     cells = shape.cells
     same = cells.halves[0] if len(cells.halves) == 1 else np.zeros(3)
     halves = address_of(cells.halves) if len(cells.halves) > 1 else 0
