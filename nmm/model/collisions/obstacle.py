@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import fields
 from itertools import pairwise
-from typing import Any, TypeAlias
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -108,6 +109,22 @@ class Obstacle:
         pose = self._checked(placement)
         self._twist = np.zeros(6) if velocity is None else self._six(velocity)
         self._placement = pose
+
+    def standing(self, placement: Placement) -> Self:
+        """A copy that stands there; this one stays where it is.
+
+        Parameters
+        ----------
+        placement : as in the constructor
+
+        Raises
+        ------
+        InputError : no such numbers
+        """
+        other = copy(self)
+        other.motion = other._velocity = None
+        other.move_to(placement)
+        return other
 
     def at(self, t: float) -> Any:
         """As `placement`, Pinocchio's; the same object as long as nothing sets it."""

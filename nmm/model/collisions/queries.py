@@ -18,10 +18,13 @@ from nmm.base.kernels.signatures import float64, int64, void
 from nmm.model.collisions.broad_phase import PairArrays, find_near
 from nmm.model.collisions.elements.boxes import Elements
 from nmm.model.collisions.elements.nearest import measure_sensed
-from nmm.model.collisions.elements.shapes_record import sensed_shapes
+from nmm.model.collisions.elements.shapes_record import grid_of, sensed_shapes
+from nmm.model.collisions.near_rows import write_rows
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.collisions.pairs import box_around, pairs_of
-from nmm.model.collisions.rows import DistanceRows, write_row, write_rows
+from nmm.model.collisions.rows import DistanceRows, write_row
+from nmm.model.collisions.seen_rows import remember
+from nmm.model.collisions.shapes import Shape
 from nmm.model.robots.joint_table import placement_rows
 from nmm.model.robots.robot import Robot
 
@@ -56,7 +59,9 @@ def _measure_near(blocks: Blocks, places: Array, results: Array) -> None:
 @compiled
 def _row(blocks: Blocks, places: Array, J: Array, row_blocks: Blocks, place: int, slot: int) -> None:
     scene = views(PairArrays, blocks.integers, blocks.floats, 0)
-    write_row(scene, J, places, views(DistanceRows, row_blocks.integers, row_blocks.floats, place), slot)
+    rows = views(DistanceRows, row_blocks.integers, row_blocks.floats, place)
+    write_row(scene, J, places, rows, slot)
+    remember(scene, places, rows, slot)
 
 
 class Queries:
@@ -73,6 +78,7 @@ class Queries:
         robot: Robot,
         shapes: pin.GeometryModel,
         obstacles: Sequence[Obstacle],
+        held: Sequence[Shape],
         band: float,
         faces: float,
     ) -> None:
@@ -95,7 +101,8 @@ class Queries:
         for k in range(len(shapes.collisionPairs)):
             geometry_data.deactivateCollisionPair(k)
         memory = Memory()
-        memory.add(_scene(robot, shapes, obstacles, band, faces))
+        self._held = [*held]
+        memory.add(_scene(robot, shapes, held, band, faces))
         self.blocks: Blocks = memory.blocks()
         self.scene = views(PairArrays, *self.blocks, 0)
         pin.computeJointJacobians(self._model, self._data, pin.neutral(self._model))
@@ -110,6 +117,21 @@ class Queries:
         self._find = checked_by_caller(find_near, _FIND)
         self._row = checked_by_caller(_row, _ROW)
         self._rows = checked_by_caller(write_rows, _ROWS)
+
+    def renew(self) -> None:
+        """Take the clouds that have been updated as they are now; between two samples."""
+        scene = self.scene
+        for k, (i, obstacle) in enumerate(self.moving):
+            shape = obstacle.shape
+            if shape is self._held[k] or not isinstance(shape, Elements):
+                continue
+            row = int(scene.sensed.row[i])
+            scene.sensed.grids[row], scene.sensed.lattice[row] = grid_of(shape)
+            scene.sensed.edition[row] += 1
+            low, high = shape.box
+            scene.boxes[i, :3], scene.boxes[i, 3:6] = 0.5 * (low + high), 0.5 * (high - low)
+            scene.boxes[i, 6] = 0.5 * np.linalg.norm(high - low)
+            self._held[k] = shape
 
     def place(self, t: float, q: Array) -> None:
         pin.computeJointJacobians(self._model, self._data, q)
@@ -151,6 +173,7 @@ class Queries:
 
     def update(self, t: float, q: Array, integers: Integers, floats: Array, place: int) -> None:
         """Measure, and write the rows of near pairs where `DistanceRows` lies in the blocks."""
+        self.renew()
         self.measure(t, q)
         self._where = Blocks(integers, floats), place
         self.least = self._rows(self.blocks, self.results, self.places, self.J, *self._where)
@@ -189,7 +212,7 @@ class Queries:
         i, j = (int(index) for index in self.scene.pairs[pair])
         if j < self._own:
             return False
-        shape = self.moving[j - self._own][1].shape
+        shape = self._held[j - self._own]
         if isinstance(shape, Elements):
             return shape.contains(self.found.oMg[j].actInv(self.found.oMg[i].act(self.scene.boxes[i, :3])))
         point_pose = coal.Transform3s(np.eye(3), self.found.oMg[i].act(self.scene.boxes[i, :3]))
@@ -240,10 +263,10 @@ def _result_view(model: pin.Model, shapes: pin.GeometryModel, geometry_data: pin
 
 
 def _scene(
-    robot: Robot, shapes: pin.GeometryModel, obstacles: Sequence[Obstacle], band: float, faces: float
+    robot: Robot, shapes: pin.GeometryModel, held: Sequence[Shape], band: float, faces: float
 ) -> PairArrays:
     objects = shapes.geometryObjects
-    own, count, n = len(objects) - len(obstacles), len(objects), robot.n
+    own, count, n = len(objects) - len(held), len(objects), robot.n
     supports = np.zeros((count, n))
     boxes = np.zeros((count, 7))
     corners: list[Array] = []
@@ -252,7 +275,7 @@ def _scene(
         for joint in robot.model.supports[shape.parentJoint].tolist()[1:]:
             supports[i, robot.model.joints[joint].idx_v] = 1.0
         boxes[i] = box_around(shape.geometry)
-        seen = i >= own and isinstance(obstacles[i - own].shape, Elements)
+        seen = i >= own and isinstance(held[i - own], Elements)
         points, rounding[i] = (np.zeros((0, 3)), 0.0) if seen else corners_of(shape.geometry)
         corners.append(points)
     pairs = np.array(pairs_of(shapes), dtype=np.int64).reshape(-1, 2)
@@ -277,9 +300,7 @@ def _scene(
         watched=np.zeros(P, dtype=np.int64),
         kept=np.zeros(P),
         nearer=np.zeros(P),
-        sensed=sensed_shapes(
-            [shape.geometry for shape in objects], [obstacle.shape for obstacle in obstacles], own
-        ),
+        sensed=sensed_shapes([shape.geometry for shape in objects], held, own),
     )
 
 

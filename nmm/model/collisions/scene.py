@@ -25,7 +25,7 @@ from nmm.model.collisions.pairs import (
     touching,
 )
 from nmm.model.collisions.queries import Queries
-from nmm.model.collisions.shapes import HalfSpace
+from nmm.model.collisions.shapes import HalfSpace, Shape
 from nmm.model.robots.loading.srdf import read_srdf
 from nmm.model.robots.loading.srdf_fitting import disabled_pairs
 from nmm.model.robots.robot import Robot
@@ -44,6 +44,7 @@ class Scene:
     ----------
     robot : the robot
     obstacles : in the order of their shapes, half-spaces last
+    held : the obstacles' shapes when it was set up: records have the addresses of what was sensed
     shapes, boxes (G, 7) : the robot's, then theirs, with the pairs, and the boxes around them
     meshes : what the robot's are of, see `query_shapes`
     names (P,) : what the two of a pair are called: links, obstacles
@@ -53,6 +54,7 @@ class Scene:
 
     robot: Robot
     obstacles: tuple[Obstacle, ...]
+    held: tuple[Shape, ...]
     shapes: pin.GeometryModel
     boxes: Array
     meshes: str
@@ -64,7 +66,8 @@ class Scene:
     @cached_property
     def queries(self) -> Queries:
         """What measures distances."""
-        return Queries(self.robot, self.shapes, self.obstacles, self.band, self.distance + FACES)
+        faces = self.distance + FACES
+        return Queries(self.robot, self.shapes, self.obstacles, self.held, self.band, faces)
 
     def words(self, pair: int) -> str:
         """The two of a pair, for messages; "nothing" for -1."""
@@ -88,6 +91,7 @@ class Scene:
         ------
         InputError : an obstacle contains a shape of the robot: no distance shows the way out
         """
+        self.queries.renew()
         distances = self.queries.distances(t, q, range(len(self.names)))
         for k in np.flatnonzero(distances < 0.0):
             if self.queries.inside(int(k)):
@@ -127,10 +131,9 @@ def set_up(
     if clash:
         raise InputError(f"{clash[0]} is a link or shape of the robot", where="collisions: obstacles")
     sorted_obstacles = tuple(sorted(obstacles, key=lambda obstacle: isinstance(obstacle.shape, HalfSpace)))
-    for obstacle in sorted_obstacles:
-        shapes.addGeometryObject(
-            pin.GeometryObject(obstacle.name, 0, 0, obstacle.at(0.0), obstacle.shape.geometry())
-        )
+    held = tuple(obstacle.shape for obstacle in sorted_obstacles)
+    for obstacle, shape in zip(sorted_obstacles, held, strict=True):
+        shapes.addGeometryObject(pin.GeometryObject(obstacle.name, 0, 0, obstacle.at(0.0), shape.geometry()))
         known.append((obstacle.name,))
     boxes = np.vstack([own_boxes, boxes_around(shapes.geometryObjects.tolist()[count:])])
     wanted = pairs_of(robot.collision_model) if own else []
@@ -156,7 +159,7 @@ def set_up(
     wanted = [pair for pair in wanted if pair not in left_out]
     always = [pair for pair in wanted if pair in own_near]
     # Pairs with what was sensed are in none of them: Coal knows a box around it.
-    seen = {j for j, obstacle in enumerate(sorted_obstacles, count) if isinstance(obstacle.shape, Elements)}
+    seen = {j for j, shape in enumerate(held, count) if isinstance(shape, Elements)}
     others = [pair for pair in wanted if pair[1] >= count and pair[1] not in seen]
     always += always_near(robot, shapes, boxes, others, distance)
     if always:
@@ -178,4 +181,4 @@ def set_up(
     for pair in remaining:
         shapes.addCollisionPair(pin.CollisionPair(*pair))
     names = tuple((known[i][-1], known[j][-1]) for i, j in remaining)
-    return Scene(robot, sorted_obstacles, shapes, boxes, meshes, names, distance, band, tuple(notes))
+    return Scene(robot, sorted_obstacles, held, shapes, boxes, meshes, names, distance, band, tuple(notes))

@@ -137,7 +137,7 @@ class Planner:
                 for name in obstacles:
                     expect_known("obstacle", name, [one.name for one in self.obstacles], "update")
                 obstacles = [
-                    Obstacle(one.shape, obstacles[one.name], name=one.name) if one.name in obstacles else one
+                    one.standing(obstacles[one.name]) if one.name in obstacles else one
                     for one in self.obstacles
                 ]
             self._prepared = self._prepared.among(obstacles)

@@ -85,6 +85,7 @@ class Prepared:
         known = self.asked.collisions.obstacles
         stand = [a is b for a, b in zip(obstacles, known, strict=False)]
         stand += [a.at(0.0) is b for a, b in zip(obstacles, self._places, strict=False)]
+        stand += [a.shape is b for a, b in zip(obstacles, self._forms, strict=False)]
         if len(known) == len(obstacles) and all(stand):
             return self
         other = object.__new__(Prepared)
@@ -96,6 +97,7 @@ class Prepared:
         robot, collisions = self.robot, asked.collisions
         self.asked = asked
         self._places = [obstacle.at(0.0) for obstacle in collisions.obstacles]
+        self._forms = [obstacle.shape for obstacle in collisions.obstacles]
         own = len(robot.collision_model.collisionPairs) > 0
         self.scene = collisions.on(robot) if collisions.obstacles or own else None
         movers, scene = [obstacle for obstacle in collisions.obstacles if obstacle.moves], self.scene

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
@@ -41,12 +42,13 @@ RESTS = 1e-3
 
 class Outline(NamedTuple):
     """An obstacle, or scenery: the hull of points (k, 3), a strength, first and last time, s (None if it
-    rests), and what the legend calls it."""
+    rests), what the legend calls it, and in the hull's place faces (F, 4, 3) of what was sensed."""
 
     points: Array
     strength: float
     times: tuple[float, float] | None
     name: str = "obstacle"
+    faces: Array | None = None
 
 
 def stroboscopic(
@@ -170,11 +172,18 @@ class MotionScene(Viewed):
         named = set[str]()
         for outline in self.outlines:
             color = OBSTACLE if outline.name == "obstacle" else style.GREY
-            shade, edge = _faded(color, outline.strength), hull(view.of(outline.points))
-            axes.fill(
-                *edge.T, facecolor=(*shade, 0.25), edgecolor=shade, linewidth=1.0, zorder=2.5,
-                label=None if outline.name in named else outline.name,
-            )  # fmt: skip
+            shade, label = _faded(color, outline.strength), None if outline.name in named else outline.name
+            if outline.faces is None:
+                edge = hull(view.of(outline.points))
+                axes.fill(
+                    *edge.T, facecolor=(*shade, 0.25), edgecolor=shade, linewidth=1.0, zorder=2.5, label=label
+                )
+            else:  # one colour, as they cover each other
+                seen = view.of(outline.faces.reshape(-1, 3)).reshape(-1, 4, 2)
+                faces = PolyCollection(list(np.unique(seen.round(6), axis=0)), rasterized=True)
+                faces.set(facecolor=_faded(color, FAINTEST), edgecolor="face", linewidth=0.6)
+                faces.set(zorder=2.5, label=label)
+                axes.add_collection(faces, autolim=False)
             named.add(outline.name)
         self.seen.draw(axes, view.of)
         if "desired" in self.lines:
@@ -209,21 +218,31 @@ def outlines(trajectory: Trajectory, times: Array) -> list[Outline]:
         if points is None:
             continue
         at = times if obstacle.moves else times[-1:]
+        faces = _faces(obstacle.shape.drawn())
         own: list[Outline] = []
         for t, strength in zip(at.tolist(), _strengths(len(at)), strict=True):
             place = obstacle.placement(t)
             moved = points @ place[:3, :3].T + place[:3, 3]
             before = own[-1] if own else None
             if before and before.times and np.allclose(before.points, moved, rtol=0.0, atol=RESTS):
-                own[-1] = Outline(moved, strength, (before.times[0], t))
+                own[-1] = before._replace(points=moved, strength=strength, times=(before.times[0], t))
             else:
-                own.append(Outline(moved, strength, (t, t) if obstacle.moves else None))
+                lasts = (t, t) if obstacle.moves else None
+                turned = None if faces is None else faces @ place[:3, :3].T + place[:3, 3]
+                own.append(Outline(moved, strength, lasts, faces=turned))
         drawn += own
     for thing in trajectory.surroundings.scenery:
         if (points := outline_points(thing.geometry)) is not None:
             place = thing.places[0]
             drawn.append(Outline(points @ place[:3, :3].T + place[:3, 3], 1.0, None, "scenery"))
     return drawn
+
+
+def _faces(drawn: Any) -> Array | None:
+    """The rectangles (F, 4, 3), m, that a page draws of what was sensed; None of a convex shape."""
+    if not type(drawn).__name__.startswith("BVHModel"):
+        return None
+    return np.array(drawn.vertices()).reshape(-1, 4, 3)
 
 
 def _strengths(count: int) -> list[float]:

@@ -19,19 +19,19 @@ def cell_mesh(points: Array, corner: Array, cell: Array) -> Any:
     while True:
         edge = cell * times
         cells = np.unique(np.floor((points - corner) / edge).astype(np.int64), axis=0)
-        faces = _outer_faces(cells)
+        faces = _merged(_outer_faces(cells))
         if len(faces) <= FACES:
             break
         times = max(times + 1, int(times * np.sqrt(len(faces) / FACES)))
-    first, axis, side = faces[:, :3], faces[:, 3], faces[:, 4]
+    first, axis, side, long, wide = faces[:, :3], *faces[:, 3:].T
     vertices = np.zeros((len(faces), 4, 3))
     for k, (a, b) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1))):
         at = first.astype(float)
         rows = np.arange(len(faces))
         at[rows, axis] += side
         # Counter-clockwise as seen from outside.
-        at[rows, (axis + 1) % 3] += np.where(side == 1, a, b)
-        at[rows, (axis + 2) % 3] += np.where(side == 1, b, a)
+        at[rows, (axis + 1) % 3] += np.where(side == 1, a, b) * long
+        at[rows, (axis + 2) % 3] += np.where(side == 1, b, a) * wide
         vertices[:, k] = corner + at * edge
     mesh = coal.BVHModelOBBRSS()
     mesh.beginModel(2 * len(faces), 4 * len(faces))
@@ -59,3 +59,25 @@ def _outer_faces(cells: Integers) -> Integers:
             marks = np.tile([axis, side], (len(outer), 1))
             faces.append(np.hstack([outer, marks]))
     return np.vstack(faces)
+
+
+def _merged(faces: Integers) -> Integers:
+    """Rectangles (R, 7) of faces (F, 5) of one plane beside each other: the first's numbers, and how many
+    there are along the axis after the face's and along the one after that."""
+    axis, rows = faces[:, 3], np.arange(len(faces))
+    planes, along, across = (faces[rows, (axis + k) % 3] for k in range(3))
+    sides = faces[:, 3] * 2 + faces[:, 4]
+    begins, long = _runs(np.stack([sides, planes, across, along]))
+    ends = np.stack([sides[begins], planes[begins], along[begins], long, across[begins]])
+    again, wide = _runs(ends)
+    return np.hstack([faces[begins[again]], long[again][:, np.newaxis], wide[:, np.newaxis]])
+
+
+def _runs(keys: Integers) -> tuple[Integers, Integers]:
+    """Of columns (K, N), those that begin a run, where the last number rises by 1 and the others stay, and
+    how long the runs are."""
+    order = np.lexsort(keys[::-1])
+    steps = np.diff(keys[:, order], axis=1)
+    goes_on = np.all(steps[:-1] == 0, axis=0) & (steps[-1] == 1)
+    begins = np.flatnonzero(np.concatenate([[True], ~goes_on]))
+    return order[begins], np.diff(np.append(begins, len(order)))

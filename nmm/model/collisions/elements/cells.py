@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nmm.base.arrays import Array, Flags
+from nmm.base.kernels.pointers import address_of
+from nmm.model.collisions.elements.field import sort_into_cells, transform
 
 #: More cells than this are made larger, in whole multiples.
 MOST = 8_000_000
@@ -55,10 +57,7 @@ def sorted_cells(
         # In larger cells those inside are elements, too: a cell may hold both.
         centres, halves = everywhere, np.vstack([halves, np.tile(0.5 * cell, (len(inside), 1))])
         inside = None
-    flat = _numbers(centres, corner, edge, counts)
-    order = np.argsort(flat, kind="stable")
-    starts = np.zeros(int(np.prod(counts)) + 1, dtype=np.int32)
-    np.cumsum(np.bincount(flat, minlength=len(starts) - 1), out=starts[1:])
+    starts, order, placed = sort_points(centres, corner, edge, counts)
     full = np.diff(starts).reshape(counts) > 0
     if inside is not None and len(inside):
         within = np.zeros(int(np.prod(counts)), dtype=bool)
@@ -71,7 +70,20 @@ def sorted_cells(
     boxes = np.zeros((0, 3))
     if halves is not None:
         boxes = halves[:1].copy() if halves.strides[0] == 0 else halves[order]
-    return Cells(corner, edge, starts, centres[order], boxes, field)
+    return Cells(corner, edge, starts, placed, boxes, field)
+
+
+def sort_points(
+    points: Array, corner: Array, cell: Array, counts: NDArray[np.int64]
+) -> tuple[NDArray[np.int32], NDArray[np.int32], Array]:
+    """The first point of each cell (cells + 1,), the numbers of points by cells (N,), and the points so."""
+    rows = np.ascontiguousarray(points, dtype=np.float64)
+    starts = np.zeros(int(np.prod(counts)) + 2, dtype=np.int32)
+    order, placed = np.empty(len(rows), dtype=np.int32), np.empty_like(rows)
+    addresses = np.array([address_of(array) for array in (rows, placed, starts, order)], dtype=np.int64)
+    sizes = np.array([*counts, len(rows)], dtype=np.int64)
+    sort_into_cells(addresses, sizes, np.array(corner), np.array(cell))
+    return starts[:-1], order, placed
 
 
 def _numbers(points: Array, corner: Array, cell: Array, counts: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -87,22 +99,8 @@ def far_field(full: Flags, cell: Array) -> NDArray[np.float32]:
     sqrt(sum (max(|i - j| - 1, 0) h)²) over full cells is the distance between the centres of a cell and of
     the nearest one among the full cells grown by their 26 neighbours.
     """
-    import edt
-
-    grown = full.copy()
-    for axis in range(3):
-        ahead, behind = (
-            tuple(slice(*ends) if k == axis else slice(None) for k in range(3))
-            for ends in ((1, None), (None, -1))
-        )
-        before = grown.copy()
-        grown[ahead] |= before[behind]
-        grown[behind] |= before[ahead]
-    # In three axes of which the last has one cell it takes thirty times as long as in two.
-    wide = [axis for axis in range(3) if full.shape[axis] > 1]
-    wide += [axis for axis in range(3) if axis not in wide][: max(0, 2 - len(wide))]
-    free = np.ascontiguousarray(~grown).reshape([full.shape[axis] for axis in wide])
-    apart = edt.edt(free, anisotropy=tuple(cell[wide].tolist()), black_border=False, parallel=1)
-    field = np.ascontiguousarray(apart, dtype=np.float32).reshape(full.shape)
-    field *= np.float32(1.0 - ROUNDED)
+    field = np.where(full, np.float32(0.0), np.float32(np.inf))
+    counts = np.array(full.shape, dtype=np.int64)
+    work = np.empty((4, int(counts.max()) + 1))
+    transform(address_of(field), counts, np.array(cell), work, 1.0 - ROUNDED)
     return field

@@ -31,6 +31,7 @@ class SensedShapes(NamedTuple):
     first_ball (G + 1,), balls (..., 4) : centres and radii; together they cover a shape
     grids (C, 8) : addresses of field, starts, centres and halves (0 where all have the same), nx, ny, nz, N
     lattice (C, 10) : corner, edges of a cell, radius, halves (0 of points)
+    edition (C,) : of the elements, from 1 on: one more where others have taken their place
     """
 
     row: IntegerVector
@@ -44,11 +45,12 @@ class SensedShapes(NamedTuple):
     balls: Matrix
     grids: IntegerMatrix
     lattice: Matrix
+    edition: IntegerVector
 
 
 def sensed_shapes(geometries: Sequence[Any], obstacles: Sequence[Any], own: int) -> SensedShapes:
     """Of Coal's shapes, the first `own` of which are the robot's, and the shapes of the obstacles after them.
-    Without one that was sensed there is nothing in it. The caller holds the obstacles."""
+    Without one that was sensed there is nothing in it. The caller holds the shapes."""
     seen = [(own + i, shape) for i, shape in enumerate(obstacles) if isinstance(shape, Elements)]
     count = len(geometries)
     row = np.full(count, -1, dtype=np.int64)
@@ -63,7 +65,7 @@ def sensed_shapes(geometries: Sequence[Any], obstacles: Sequence[Any], own: int)
         balls[i] = covering(geometries[i])
     grids, lattice = np.zeros((len(seen), 8), dtype=np.int64), np.zeros((len(seen), 10))
     for k, (_, shape) in enumerate(seen):
-        grids[k], lattice[k] = _grid(shape)
+        grids[k], lattice[k] = grid_of(shape)
     return SensedShapes(
         row=row,
         kind=kind,
@@ -76,10 +78,12 @@ def sensed_shapes(geometries: Sequence[Any], obstacles: Sequence[Any], own: int)
         balls=np.concatenate([*balls, np.zeros((0, 4))]),
         grids=grids,
         lattice=lattice,
+        edition=np.ones(len(seen), dtype=np.int64),
     )
 
 
-def _grid(shape: Elements) -> tuple[Any, Array]:
+def grid_of(shape: Elements) -> tuple[Any, Array]:
+    """A row of `grids` and one of `lattice`."""
     cells = shape.cells
     same = cells.halves[0] if len(cells.halves) == 1 else np.zeros(3)
     halves = address_of(cells.halves) if len(cells.halves) > 1 else 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from threading import RLock, Thread
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, matrix, positive, scalar, vector
 from nmm.base.errors import InputError, expect
+from nmm.base.text_format import one_line
 from nmm.model.collisions.elements.boxes import CELL, Elements
 from nmm.model.collisions.obstacle import Obstacle, Placement
 from nmm.model.collisions.sensed.cloud_files import points_of_file
@@ -22,6 +24,8 @@ if TYPE_CHECKING:
 FARTHEST = 1e6
 #: So many points are looked at for `spacing`.
 LOOKED_AT = 2000
+#: One for all clouds, which are copied and sent to processes.
+_UPDATING = RLock()
 
 
 class PointCloud(Obstacle):
@@ -66,13 +70,7 @@ class PointCloud(Obstacle):
     ) -> None:
         name = name or "point cloud"
         where = f"obstacle {name}: points"
-        try:
-            rows = np.asarray(points, dtype=None if isinstance(points, np.ndarray) else np.float64)
-            numeric = rows.dtype.kind in "fiu"
-        except (TypeError, ValueError):
-            numeric = False
-        if not numeric or rows.ndim != 2 or rows.shape[1] != 3:
-            raise InputError(where=where, expected="an array of shape (N, 3), m", got=points)
+        rows = _rows(points, where)
         finite = np.isfinite(rows).all(axis=1)
         self.left_out = int(len(rows) - np.count_nonzero(finite))
         rows = np.asarray(rows[finite] if self.left_out else rows, dtype=np.float64)
@@ -83,6 +81,13 @@ class PointCloud(Obstacle):
         cell = positive(cell, f"obstacle {name}: cell")
         super().__init__(Elements(rows, None, radius, (cell,) * 3), placement, name=name)
         self._cell = cell
+        self._waiting: Array | None = None
+        self._worker: Thread | None = None
+        self._fault: InputError | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Copies have the points that are in place; what is being made stays here."""
+        return {**vars(self), "_waiting": None, "_worker": None}
 
     def __repr__(self) -> str:
         return f"PointCloud({self.name}, {len(self.points)} points, radius={self.radius:g})"
@@ -118,6 +123,62 @@ class PointCloud(Obstacle):
         made = PointCloud(points, radius, self.name, self.placement(0.0), self._cell)
         made.left_out = self.left_out
         return made
+
+    def update(self, points: ArrayLike, wait: bool = False) -> None:
+        """Set its points from now on: of a newer scan, in the axes of its placement.
+
+        Their cells are made in a background thread, without Python's lock. A controller takes them at the
+        first sample after that, a `Planner` at its next plan; until then the earlier ones hold. Of scans that
+        come faster than they are made the last one is. The array is not copied: it must not change later.
+
+        Parameters
+        ----------
+        points (N, 3) : as of the constructor
+        wait : whether to return when they are in place
+
+        Raises
+        ------
+        InputError : no array (N, 3), or, of these points where it waits and else of earlier ones, no finite
+            point
+
+        Examples
+        --------
+        >>> cloud = nmm.PointCloud([[2.0, 0.0, 0.3], [2.0, 0.1, 0.3]], name="scan")
+        >>> cloud.update([[1.5, 0.0, 0.3]], wait=True)
+        >>> cloud
+        PointCloud(scan, 1 points, radius=0.01)
+        """
+        rows = _rows(points, f"obstacle {self.name}: points")
+        with _UPDATING:
+            self._waiting = rows
+            if self._worker is None:
+                self._worker = Thread(target=self._make, name=f"nmm {self.name}", daemon=True)
+                self._worker.start()
+            worker = self._worker
+        if wait:
+            worker.join()
+        with _UPDATING:
+            fault, self._fault = self._fault, None
+        if fault is not None:
+            raise fault
+
+    def _make(self) -> None:
+        """Make cells of the points that wait, until none do."""
+        while True:
+            with _UPDATING:
+                rows, self._waiting = self._waiting, None
+                if rows is None:
+                    self._worker = None
+                    return
+            try:
+                made = PointCloud(rows, self.radius, self.name, cell=self._cell)
+                _ = made._elements.cells, made._elements.box  # before anybody asks for them
+            except Exception as error:  # told by the next call: nothing else sees this thread
+                fault = error if isinstance(error, InputError) else InputError(one_line(str(error)))
+                with _UPDATING:
+                    self._fault = fault
+                continue
+            self.shape, self.left_out = made.shape, made.left_out
 
     def transformed(self, T: ArrayLike) -> PointCloud:
         """The cloud with its points in other axes.
@@ -228,3 +289,15 @@ class PointCloud(Obstacle):
         PointCloud(scan, 100 points, radius=0.01)
         """
         return cls(points_of_file(file), radius, name or Path(file).stem, placement)
+
+
+def _rows(points: ArrayLike, where: str) -> Array:
+    """Points (N, 3) as an array of numbers, as it is where it is one."""
+    try:
+        rows = np.asarray(points, dtype=None if isinstance(points, np.ndarray) else np.float64)
+        numeric = rows.dtype.kind in "fiu"
+    except (TypeError, ValueError):
+        numeric = False
+    if not numeric or rows.ndim != 2 or rows.shape[1] != 3:
+        raise InputError(where=where, expected="an array of shape (N, 3), m", got=points)
+    return rows

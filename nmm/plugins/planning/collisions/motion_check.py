@@ -147,7 +147,7 @@ def moved_shapes(robot: Robot, scene: Scene | None) -> MovedShapes:
                 levers[k], stems[k] = own.between[pair]
         planes = sum(isinstance(obstacle.shape, HalfSpace) for obstacle in scene.obstacles)
         geometries = [shape.geometry for shape in objects]
-        sensed = sensed_shapes(geometries, [obstacle.shape for obstacle in scene.obstacles], count)
+        sensed = sensed_shapes(geometries, scene.held, count)
     first_corner = np.cumsum([0, *map(len, parts.corners)], dtype=np.int64)
     corners = np.concatenate([*parts.corners, np.zeros((0, 3))])
     degrees, neighbours = np.zeros(len(corners), dtype=np.int64), []

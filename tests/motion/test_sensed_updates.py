@@ -1,0 +1,143 @@
+"""A cloud that is updated while a controller runs and a planner plans."""
+
+from __future__ import annotations
+
+import pickle
+import threading
+
+import numpy as np
+import pytest
+from scanned import door
+
+import nmm
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError
+from nmm.base.kernels.pointers import address_of
+from nmm.model.collisions.elements.field import transform
+
+#: Three standard deviations of the noise of scans.
+NOISE = 3 * 0.003
+
+
+def scan(seed: int, x: float = 2.0) -> Array:
+    """A wall without a door, as a scanner sees it."""
+    rng = np.random.default_rng(seed)
+    points = rng.uniform([x, -2.0, 0.0], [x, 2.0, 1.5], (30_000, 3))
+    return points + rng.normal(0.0, 0.003, points.shape)
+
+
+def driven(cloud: nmm.PointCloud) -> nmm.Controller:
+    """A controller whose target is behind the wall."""
+    return nmm.Controller(
+        nmm.load("unicycle_3r"),
+        nmm.Task(nmm.Position("ee", "xy"), [4.0, 0.0], speed=0.5),
+        nmm.DampedLeastSquares(),
+        collisions=nmm.Collisions(0.03, obstacles=[cloud]),
+        limits=nmm.Limits(acceleration={"platform": 2.0, "arm": 8.0}),
+        dt=0.02,
+    )
+
+
+def test_distances_are_kept_across_updates_at_10_hz() -> None:
+    """Of the true wall, by Coal, at every sample; nothing waits for the cells, as in a robot's loop."""
+    cloud = nmm.PointCloud(scan(0), radius=0.025, name="scan")
+    controller = driven(cloud)
+    robot = controller.robot
+    wall = nmm.Obstacle(nmm.Box([0.02, 4.0, 1.5]), [2.01, 0.0, 0.75], name="true")
+    true = nmm.Collisions(0.03, self_collisions=False, obstacles=[wall]).on(robot).queries
+    scans = [scan(seed) for seed in range(1, 5)]
+    q, least, shapes = robot.q({"q1": 0.3, "q2": 0.6}), np.inf, {id(cloud.shape)}
+    held = [cloud.shape]
+    for k in range(700):
+        if k % 5 == 0:
+            cloud.update(scans[k // 5 % 4])
+        q, _ = controller.step(0.02 * k, q, 0.02, "zoh")
+        least = min(least, true.nearest(0.0, q)[0])
+        if id(cloud.shape) not in shapes:
+            shapes.add(id(cloud.shape))
+            held.append(cloud.shape)
+    assert len(held) > 5
+    assert 0.03 - NOISE <= least < 0.1
+
+
+def test_a_controller_takes_new_points_at_its_next_sample() -> None:
+    """The wall comes nearer by 0.3 m: the robot stops before where it is now."""
+    cloud = nmm.PointCloud(scan(0), radius=0.025, name="scan")
+    controller = driven(cloud)
+    robot = controller.robot
+    q = robot.q({"q1": 0.3, "q2": 0.6})
+    for k in range(700):
+        if k == 50:
+            cloud.update(scan(1, x=1.7), wait=True)
+        q, _ = controller.step(0.02 * k, q, 0.02, "zoh")
+    wall = nmm.Obstacle(nmm.Box([0.02, 4.0, 1.5]), [1.71, 0.0, 0.75], name="true")
+    true = nmm.Collisions(0.03, self_collisions=False, obstacles=[wall]).on(robot).queries
+    assert 0.03 - NOISE <= true.nearest(0.0, q)[0] < 0.1
+
+
+def test_what_is_no_scan_is_refused_and_the_earlier_points_stay() -> None:
+    cloud = nmm.PointCloud(scan(0), radius=0.025, name="scan")
+    shape = cloud.shape
+    with pytest.raises(InputError, match="shape"):
+        cloud.update(np.zeros((3, 2)))
+    with pytest.raises(InputError, match="finite"):
+        cloud.update(np.full((3, 3), np.nan), wait=True)
+    assert cloud.shape is shape
+    cloud.update(np.full((3, 3), np.nan))
+    worker = cloud._worker
+    if worker is not None:
+        worker.join()
+    with pytest.raises(InputError, match="finite"):
+        cloud.update(scan(1), wait=True)
+    assert cloud.shape is not shape
+    cloud.update(scan(2), wait=True)
+    again = pickle.loads(pickle.dumps(cloud))
+    assert np.array_equal(again.points, scan(2))
+    again.update([[1.0, 0.0, 0.0]], wait=True)
+    assert len(again.points) == 1
+
+
+def test_a_planner_keeps_off_a_cloud_as_it_is_now() -> None:
+    robot = nmm.load("unicycle_3r")
+    start, goal = {"x": 0.3, "y": -0.9, "q1": 0.5}, {"x": 4.0, "y": 0.6, "theta": 0.0}
+    cloud = nmm.PointCloud(door(8000, 0), radius=0.03, name="wall")
+    planner = nmm.Planner(robot, [cloud])
+    through = planner.plan(start, goal)
+    aside = door(8000, 1) + np.array([0.0, 1.5, 0.0])
+    cloud.update(aside, wait=True)
+    moved = planner.plan(start, goal)
+    fresh = nmm.plan(robot, start, goal, [nmm.PointCloud(aside, radius=0.03, name="wall")])
+    assert moved.duration == fresh.duration != through.duration
+    planner.update({"wall": [0.0, -1.5, 0.0]})
+    (kept,) = planner.obstacles
+    assert isinstance(kept, nmm.PointCloud)
+    assert kept.radius == 0.03
+    assert np.allclose(cloud.placement(0.0)[:3, 3], 0.0)
+    again = planner.plan(start, goal)
+    q, _ = again(np.linspace(0.0, again.duration, 300))
+    assert np.abs(q[np.abs(q[:, 0] - 2.0) < 0.05][:, 1]).max() < 0.45
+
+
+def test_other_threads_run_while_a_field_is_made() -> None:
+    """A call that holds Python's lock would let this thread count to nothing."""
+    shape = (200, 200, 100)
+    field = np.full(shape, np.float32(np.inf))
+    field[::20, ::20, ::20] = 0.0
+    counts, cell, work = np.array(shape, dtype=np.int64), np.full(3, 0.05), np.empty((4, 201))
+    small = field[:1].copy()  # compiled or read before it counts
+    transform(address_of(small), np.array(small.shape, dtype=np.int64), cell, work, 1.0)
+    going, done = threading.Event(), threading.Event()
+
+    def make() -> None:
+        going.set()
+        transform(address_of(field), counts, cell, work, 1.0)
+        done.set()
+
+    thread = threading.Thread(target=make)
+    thread.start()
+    going.wait()
+    count = 0
+    while not done.is_set():
+        count += 1
+    thread.join()
+    assert count > 1000
