@@ -36,6 +36,8 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from functools import cache
+from itertools import islice
+from math import prod
 from typing import Annotated, Any, NamedTuple, TypeAlias, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -153,16 +155,19 @@ def put_back(integers: Integers, floats: Array, own_integers: Integers, own: Arr
 
 def views(record: type[R], integers: Integers, floats: Array, place: int) -> R:
     """The record whose header begins at `integers[place]`, its arrays as views of the blocks."""
-    parts: list[Any] = []
+    header = integers[place : place + header_length(record)].tolist()
+    return record(*_parts(record, integers, floats, iter(header)))
+
+
+def _parts(record: type, integers: Integers, floats: Array, header: Iterator[int]) -> Iterator[Any]:
     for field in fields_of(record).values():
         if isinstance(field, Kind):
-            block: Any = integers if field.dtype is np.int64 else floats
-            extents = tuple(int(extent) for extent in integers[place + 1 : place + 1 + field.ndim])
-            parts.append(view(block, int(integers[place]), extents))
+            block, first = integers if field.dtype is np.int64 else floats, next(header)
+            extents = tuple(islice(header, field.ndim))
+            numbers = block[first : first + prod(extents)]
+            yield numbers if field.ndim == 1 else numbers.reshape(extents)
         else:
-            parts.append(int(integers[place]) if field is int else views(field, integers, floats, place))
-        place += length_of(field)
-    return record(*parts)
+            yield next(header) if field is int else field(*_parts(field, integers, floats, header))
 
 
 @cache

@@ -26,6 +26,8 @@ THIN = 5e-4
 _CORNERS = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, -1).T
 #: How many configurations are drawn to see which pairs always touch, and how often links do.
 SAMPLES, CONFIGURATIONS = 200, 1000
+#: In so many of these boxes are looked at first.
+FIRST = 8
 #: Coordinates without limits are drawn from ± this, m or rad.
 RANGE = 4.0
 #: Limits of this size are none.
@@ -129,22 +131,57 @@ def always_near(
     return left
 
 
+@lru_cache(maxsize=8)
+def _own_places(robot: Robot, meshes: str) -> Array:
+    """Where the robot's shapes are in the first random configurations, (FIRST, G, 12)."""
+    shapes = query_shapes(robot, meshes)
+    data, placed = robot.model.createData(), pin.GeometryData(shapes)
+    places, rows = placement_rows(placed.oMg), []
+    for q in random_configurations(robot)[:FIRST]:
+        pin.updateGeometryPlacements(robot.model, data, shapes, placed, q)
+        rows.append(places.copy())
+    return np.array(rows)
+
+
+def perhaps_near(
+    robot: Robot, meshes: str, places: Array, boxes: Array, pairs: Sequence[Pair], distance: float
+) -> list[Pair]:
+    """Of pairs of the robot's shapes with obstacles, which are at these places (K, 12), those that boxes do
+    not show to be `distance` apart, m, in one of the first random configurations: `always_near` of the others
+    is False."""
+    if not pairs:
+        return []
+    own = _own_places(robot, meshes)
+    count, (i, j) = own.shape[1], np.array(pairs, dtype=np.int64).T
+    each = np.arange(len(own))[:, np.newaxis] * count
+    numbers = np.column_stack([(i + each).ravel(), np.tile(j + (len(own) - 1) * count, len(own))])
+    all_boxes = np.vstack([np.tile(boxes[:count], (len(own), 1)), boxes[count:]])
+    bounds = _box_bounds(np.vstack([own.reshape(-1, 12), places]), all_boxes, numbers)
+    near = np.flatnonzero(bounds.reshape(len(own), -1).max(axis=0) < distance)
+    return [pairs[k] for k in near.tolist()]
+
+
 def measured_pairs(
-    robot: Robot, shapes: pin.GeometryModel, pairs: Sequence[Pair], known_boxes: Array | None = None
+    robot: Robot,
+    shapes: pin.GeometryModel,
+    pairs: Sequence[Pair] | Integers,
+    known_boxes: Array | None = None,
 ) -> Callable[[Array, float], Array]:
     """The function q (n,), enough -> each pair's distance (pairs,), m; below 0 inside each other. Of pairs
     whose boxes are farther apart than `enough`, m, a lower bound."""
-    model, data, geometry_data = robot.model, robot.model.createData(), pin.GeometryData(shapes)
+    model, data, placed = robot.model, robot.model.createData(), shapes.copy()
+    placed.removeAllCollisionPairs()  # they would each have memory of Coal's
+    geometry_data = pin.GeometryData(placed)
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     objects = shapes.geometryObjects
     boxes = boxes_around(objects) if known_boxes is None else known_boxes
-    geometries = [shape.geometry for shape in objects]
+    geometries, places = [shape.geometry for shape in objects], placement_rows(geometry_data.oMg)
 
     def measure(q: Array, enough: float) -> Array:
-        pin.updateGeometryPlacements(model, data, shapes, geometry_data, q)
+        pin.updateGeometryPlacements(model, data, placed, geometry_data, q)
         transforms: dict[int, Any] = {}
-        numbers = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-        distances = _box_bounds(placement_rows(geometry_data.oMg), boxes, numbers)
+        numbers = np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
+        distances = _box_bounds(places, boxes, numbers)
         for k in np.flatnonzero(distances < enough):
             pair = numbers[k].tolist()
             for i in pair:

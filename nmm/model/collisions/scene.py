@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -16,16 +16,19 @@ from nmm.base.errors import InputError, RobotError, few
 from nmm.model.collisions.elements.boxes import Elements
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.collisions.pairs import (
+    Pair,
     always_near,
     boxes_around,
     link_names,
     named_pairs,
     own_shapes,
     pairs_of,
+    perhaps_near,
     touching,
 )
 from nmm.model.collisions.queries import Queries
-from nmm.model.collisions.shapes import HalfSpace, Shape
+from nmm.model.collisions.shapes import Box, HalfSpace, Round, Shape, Sphere
+from nmm.model.robots.joint_table import as_row
 from nmm.model.robots.loading.srdf import read_srdf
 from nmm.model.robots.loading.srdf_fitting import disabled_pairs
 from nmm.model.robots.robot import Robot
@@ -50,6 +53,7 @@ class Scene:
     names (P,) : what the two of a pair are called: links, obstacles
     distance : to keep, m; band : within which pairs have rows, m
     notes : what was left out and why, a sentence each
+    left_out : pairs with obstacles that were left out as always near
     """
 
     robot: Robot
@@ -62,6 +66,7 @@ class Scene:
     distance: float
     band: float
     notes: tuple[str, ...]
+    left_out: tuple[Pair, ...]
 
     @cached_property
     def queries(self) -> Queries:
@@ -84,6 +89,23 @@ class Scene:
         """Pinocchio's placements of the obstacles at t, s; None for one with a path, which a record knows."""
         return tuple(None if obstacle.moves else obstacle.at(t) for obstacle in self.obstacles)
 
+    def moved(self, obstacles: Sequence[Obstacle]) -> Scene | None:
+        """The same with these in place of the obstacles, where they differ from them by their places at most
+        and no pair with one is always near, before or now; else None."""
+        sorted_obstacles = in_order(obstacles)
+        if self.left_out or len(obstacles) != len(self.obstacles):
+            return None
+        if not all(map(_same_but_for_place, self.obstacles, self.held, sorted_obstacles)):
+            return None
+        shapes = self.shapes.copy()
+        count = len(shapes.geometryObjects) - len(sorted_obstacles)
+        for j, obstacle in enumerate(sorted_obstacles, count):
+            shapes.geometryObjects[j].placement = obstacle.at(0.0)
+        of_robot = self.robot, shapes, self.boxes, self.meshes
+        if always_near_obstacles(*of_robot, pairs_of(shapes), sorted_obstacles, self.held, self.distance):
+            return None
+        return replace(self, obstacles=sorted_obstacles, shapes=shapes)
+
     def check_start(self, t: float, q: Array) -> list[str]:
         """What is nearer than the distance at q (n,), a sentence each pair, the nearest first.
 
@@ -103,6 +125,39 @@ class Scene:
             f"{self.words(int(k))} are {distances[k]:.4g} m apart at the start"
             for k in order[: np.count_nonzero(distances < self.distance)]
         ]
+
+
+def in_order(obstacles: Sequence[Obstacle]) -> tuple[Obstacle, ...]:
+    """Obstacles in the order of their shapes in a scene: half-spaces last."""
+    return tuple(sorted(obstacles, key=lambda obstacle: isinstance(obstacle.shape, HalfSpace)))
+
+
+def _same_but_for_place(first: Obstacle, held: Shape, second: Obstacle) -> bool:
+    """Whether two obstacles that stand have one name and shape; a mesh's file, or a cloud, may have
+    changed."""
+    shape = second.shape
+    same = shape is held or (isinstance(shape, Box | Sphere | Round | HalfSpace) and shape == held)
+    return same and first.name == second.name and not first.moves and not second.moves
+
+
+def always_near_obstacles(
+    robot: Robot,
+    shapes: pin.GeometryModel,
+    boxes: Array,
+    meshes: str,
+    pairs: Sequence[Pair],
+    obstacles: Sequence[Obstacle],
+    held: Sequence[Shape],
+    distance: float,
+) -> list[Pair]:
+    """Of the pairs those with obstacles, the last shapes, that are always nearer than `distance`, m. None is
+    with what was sensed: of it Coal knows a box around all."""
+    count = len(shapes.geometryObjects) - len(obstacles)
+    sensed = {j for j, shape in enumerate(held, count) if isinstance(shape, Elements)}
+    others = [pair for pair in pairs if pair[1] >= count and pair[1] not in sensed]
+    places = np.array([as_row(obstacle.at(0.0)) for obstacle in obstacles]).reshape(-1, 12)
+    near = perhaps_near(robot, meshes, places, boxes, others, distance)
+    return always_near(robot, shapes, boxes, near, distance)
 
 
 def set_up(
@@ -130,7 +185,7 @@ def set_up(
     clash = sorted({obstacle.name for obstacle in obstacles} & {name for names in known for name in names})
     if clash:
         raise InputError(f"{clash[0]} is a link or shape of the robot", where="collisions: obstacles")
-    sorted_obstacles = tuple(sorted(obstacles, key=lambda obstacle: isinstance(obstacle.shape, HalfSpace)))
+    sorted_obstacles = in_order(obstacles)
     held = tuple(obstacle.shape for obstacle in sorted_obstacles)
     for obstacle, shape in zip(sorted_obstacles, held, strict=True):
         shapes.addGeometryObject(pin.GeometryObject(obstacle.name, 0, 0, obstacle.at(0.0), shape.geometry()))
@@ -157,11 +212,10 @@ def set_up(
         notes += [f"{disables}: {few(often)}"] if often else []
         left_out |= matches
     wanted = [pair for pair in wanted if pair not in left_out]
-    always = [pair for pair in wanted if pair in own_near]
-    # Pairs with what was sensed are in none of them: Coal knows a box around it.
-    seen = {j for j, shape in enumerate(held, count) if isinstance(shape, Elements)}
-    others = [pair for pair in wanted if pair[1] >= count and pair[1] not in seen]
-    always += always_near(robot, shapes, boxes, others, distance)
+    near_obstacles = always_near_obstacles(
+        *(robot, shapes, boxes, meshes, wanted, sorted_obstacles, held, distance)
+    )
+    always = [pair for pair in wanted if pair in own_near] + near_obstacles
     if always:
         near = list(dict.fromkeys(name(pair) for pair in always))
         notes.append(
@@ -181,4 +235,7 @@ def set_up(
     for pair in remaining:
         shapes.addCollisionPair(pin.CollisionPair(*pair))
     names = tuple((known[i][-1], known[j][-1]) for i, j in remaining)
-    return Scene(robot, sorted_obstacles, held, shapes, boxes, meshes, names, distance, band, tuple(notes))
+    return Scene(
+        *(robot, sorted_obstacles, held, shapes, boxes, meshes, names, distance, band, tuple(notes)),
+        tuple(near_obstacles),
+    )

@@ -31,6 +31,7 @@ from nmm.plugins.planning.held_motion import ROUND, HeldTiming
 from nmm.plugins.planning.holding import ARRIVED, BLOCKED, LOST, Held
 from nmm.plugins.planning.prepared import Asked
 from nmm.plugins.planning.samples import SampledMotion
+from nmm.plugins.planning.shortening import shortened
 from nmm.plugins.planning.tree import Trees
 
 #: The steps by which the arm follows while a way is looked for, s, and of its joints, rad or m.
@@ -240,7 +241,7 @@ class HeldWays:
             self.trees.looked[0] += 1
             return self.clock() < 0.0 or self.held.along(start, whole, TICK, FAR).ended != ARRIVED
 
-        return self.guide.shortened(start, legs, rounds, 3 + self._first, blocked)
+        return shortened(self.guide, start, legs, rounds, 3 + self._first, blocked)
 
 
 def refuse_beside_hold(robot: Robot, asked: Asked) -> None:

@@ -32,7 +32,7 @@ from nmm.plugins.planning.collisions.legs_check import (
     too_near,
 )
 from nmm.plugins.planning.collisions.motion_check import MotionCheck
-from nmm.plugins.planning.goals import STEPS, Newton, TaskError, newton_step
+from nmm.plugins.planning.targets import STEPS, Newton, TaskError, newton_step
 from nmm.plugins.planning.tree import PLACE, Trees
 from nmm.plugins.planning.ways import leg_time
 

@@ -23,13 +23,14 @@ from nmm.motion.disturbances import Disturbances
 from nmm.motion.trajectory import Outcome, Trajectory
 from nmm.motion.verdict import Verdict
 from nmm.plugins.planning.collisions.motion_check import MotionCheck
-from nmm.plugins.planning.goals import TaskError, goal_task
+from nmm.plugins.planning.goals import goal_task
 from nmm.plugins.planning.interior import SHOOT, shoot
 from nmm.plugins.planning.plan import Plan
 from nmm.plugins.planning.problem import END, MARGIN, largest_inputs, shooting_problem
 from nmm.plugins.planning.recorded import recorded
 from nmm.plugins.planning.samples import MotionSamples, SampledMotion
 from nmm.plugins.planning.shooting import LOOK, Shooting, first_blocked_sample
+from nmm.plugins.planning.targets import TaskError
 
 #: Speeds of inputs without limits, m/s and rad/s.
 USUAL = 1.0

@@ -17,6 +17,8 @@ from nmm.control.goal import Goal
 from nmm.control.limits.collisions import Collisions
 from nmm.control.limits.limits import Limits
 from nmm.model.collisions.obstacle import Obstacle
+from nmm.model.collisions.scene import Scene
+from nmm.model.collisions.shapes import Shape
 from nmm.model.robots.robot import Robot
 from nmm.plugins.planning.collisions.motion_check import MotionCheck
 from nmm.plugins.planning.effort import efforts_of
@@ -90,16 +92,25 @@ class Prepared:
             return self
         other = object.__new__(Prepared)
         vars(other).update(vars(self))
-        other._place(replace(self.asked, collisions=collisions))
+        asked, forms = replace(self.asked, collisions=collisions), [obstacle.shape for obstacle in obstacles]
+        scene = None if self.scene is None or self.movers is not None else self.scene.moved(obstacles)
+        if scene is None:
+            other._place(asked)
+        else:  # no lock: a search writes nothing that the next one does not write first
+            other._know(asked, forms, scene)
+            other._lay_out(self.check.among(scene))
         return other
+
+    def _know(self, asked: Asked, forms: list[Shape], scene: Scene | None) -> None:
+        """forms : the obstacles' shapes, read before the scene was made: clouds may be updated meanwhile."""
+        self.asked, self._forms, self.scene = asked, forms, scene
+        self._places = [obstacle.at(0.0) for obstacle in asked.collisions.obstacles]
 
     def _place(self, asked: Asked) -> None:
         robot, collisions = self.robot, asked.collisions
-        self.asked = asked
-        self._places = [obstacle.at(0.0) for obstacle in collisions.obstacles]
-        self._forms = [obstacle.shape for obstacle in collisions.obstacles]
+        forms = [obstacle.shape for obstacle in collisions.obstacles]
         own = len(robot.collision_model.collisionPairs) > 0
-        self.scene = collisions.on(robot) if collisions.obstacles or own else None
+        self._know(asked, forms, collisions.on(robot) if collisions.obstacles or own else None)
         movers, scene = [obstacle for obstacle in collisions.obstacles if obstacle.moves], self.scene
         self.movers = None
         if movers:  # the way is looked for among what stands, and its timing among what moves

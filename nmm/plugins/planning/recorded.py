@@ -19,7 +19,7 @@ from nmm.motion.seen import SeenPoints
 from nmm.motion.shown_frame import shown_frame
 from nmm.motion.trajectory import Trajectory
 from nmm.motion.verdict import AS_ASKED, Verdict
-from nmm.plugins.planning.goals import TaskError
+from nmm.plugins.planning.targets import TaskError
 
 
 def recorded(

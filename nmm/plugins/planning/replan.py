@@ -13,7 +13,7 @@ from nmm.base.arrays import Array, counted, positive, scalar
 from nmm.base.errors import InputError, expect_kind
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.platforms.tractor import Tractor
-from nmm.plugins.planning.plan import Plan
+from nmm.plugins.planning.plan import Found, Plan
 from nmm.plugins.planning.planned import finished
 from nmm.plugins.planning.prepared import STEP
 from nmm.plugins.planning.search import PlanSearch
@@ -82,9 +82,16 @@ def replan(
         raise InputError(what, where="replan: obstacles", expected="nmm.Horizon, which steps aside")
     prepared = old.prepared.among(obstacles)
     with prepared.lock:
-        search = PlanSearch(prepared, start, [old.goal], seed, "replan: q")
+        search = PlanSearch(prepared, start, [old.goal], seed, "replan: q", _nearer(old))
         search.begin(positive(seconds, "seconds"), progress)
         return _joined(search, plan, t, counted(shorten, "shorten", 0))
+
+
+def _nearer(old: Found) -> dict[tuple[str, str], float]:
+    """How near pairs of the robot's own shapes may be, m, by name: as in the plan before, else the way to its
+    end may be closed."""
+    others = {obstacle.name for obstacle in old.asked.collisions.obstacles}
+    return {pair: near for pair, near in old.nearer.items() if others.isdisjoint(pair)}
 
 
 def _joined(search: PlanSearch, plan: Plan, t: float | None, shorten: int) -> Plan:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from itertools import pairwise
@@ -20,6 +20,7 @@ from nmm.plugins.planning.goals import GoalPostures, Wanted, alternatives, nothi
 from nmm.plugins.planning.path import Guide
 from nmm.plugins.planning.prepared import Prepared
 from nmm.plugins.planning.search_space import drawn_within
+from nmm.plugins.planning.shortening import shortened
 from nmm.plugins.planning.tree import SPARE, Trees
 from nmm.plugins.planning.ways import LEGS
 
@@ -33,8 +34,11 @@ T = TypeVar("T")
 
 
 class PlanSearch:
-    """What one plan needs: where it begins, its goals, and what is `prepared` for it. where : the start is
-    named so in errors"""
+    """What one plan needs: where it begins, its goals, and what is `prepared` for it.
+
+    where : the start is named so in errors
+    nearer : pairs by name that may come so near, m, as in a plan that this one goes on with
+    """
 
     _ends: float
     asked_kept: Array
@@ -47,8 +51,10 @@ class PlanSearch:
         goals: Sequence[Wanted],
         seed: int = 0,
         where: str = "plan: start",
+        nearer: Mapping[tuple[str, str], float] | None = None,
     ) -> None:
         self.prepared, self.start, self.goals, self._where = prepared, start, goals, where
+        self._nearer = nearer
         self.robot, self.asked, self.scene, self.movers, self.efforts, self.costs = (
             *(prepared.robot, prepared.asked, prepared.scene, prepared.movers),
             *(prepared.efforts, prepared.costs),
@@ -115,7 +121,7 @@ class PlanSearch:
     def begin(self, seconds: float, progress: Callable[[float], None] | None) -> None:
         """Start the clock; `InputError` for a start that touches something."""
         self._ends, self._seconds, self._progress = time.monotonic() + seconds, seconds, progress
-        self.check.keep(self.start[np.newaxis])
+        self.check.keep(self.start[np.newaxis], self._nearer)
         self.asked_kept = self.check.kept.copy()
         scene = self.check.scene
         if scene is not None and self.check.too_near(self.start) >= 0:
@@ -127,7 +133,7 @@ class PlanSearch:
     def shortened(self, start: Array, legs: Array, rounds: int) -> Array:
         """Shorter legs from a configuration."""
         arm = 3 + (0 if self.robot.platform.n_p < 3 else self.robot.platform.n_p)
-        return self.guide.shortened(start, legs, rounds, arm)
+        return shortened(self.guide, start, legs, rounds, arm)
 
     def blocked(self, start: Array, legs: Array) -> int:
         """The number of a pair that comes too near on legs from a free configuration, their number where the

@@ -42,9 +42,7 @@ class TimedLegs:
         if not len(self.legs):
             return np.tile(self.corners[-1], (len(t), 1)), np.zeros((len(t), self.inputs.shape[1]))
         leg, share, rate = self.shares(t)
-        places = zip(leg.tolist(), share.tolist(), strict=True)
-        q = np.array([self.guide.at(self.corners[k], self.legs[k], part) for k, part in places])
-        return q, self.inputs[leg] * rate[:, np.newaxis]
+        return self.guide.points(self.corners, self.legs, leg, share), self.inputs[leg] * rate[:, np.newaxis]
 
     def shares(self, t: Array) -> tuple[Integers, Array, Array]:
         """The leg at each time (N,), s, how much of it is gone, and its rate, 1/s."""

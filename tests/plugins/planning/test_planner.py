@@ -61,6 +61,27 @@ def test_after_an_update_plans_are_those_of_a_new_planner(robot):
     assert np.array_equal(before.corners, kept)
 
 
+def test_what_is_left_out_beside_an_obstacle_is_what_is_left_out_where_it_stands():
+    """A plate slid under the foot of an arm and out again: there it is nearer than asked whatever the arm
+    does, which is no reason for the plans before and after to leave it out."""
+    arm = nmm.load("package://example-robot-data/robots/ur_description/urdf/ur5_robot.urdf", platform="fixed")
+    plate = nmm.Obstacle(nmm.Box([0.1, 0.1, 0.02]), [0.8, 0.0, 0.3], name="plate")
+    ball = nmm.Obstacle(nmm.Sphere(0.05), [0.6, 0.3, 0.6], name="ball")
+    planner = nmm.Planner(arm, [plate, ball])
+    start = {"shoulder_lift_joint": -1.5, "elbow_joint": 1.2}
+    left_out = []
+    for at in ([0.8, 0.1, 0.3], [0.0, 0.0, -0.03], [0.0, 0.0, -0.02], [0.7, 0.0, 0.3, 0.3, 0.2, 0.1]):
+        planner.update({"plate": at})
+        moved = nmm.Obstacle(plate.shape, at, name="plate")
+        one = planner.plan(start, {"shoulder_pan_joint": 0.8})
+        other = nmm.plan(arm, start, {"shoulder_pan_joint": 0.8}, [moved, ball])
+        assert same(one, other)
+        assert one.found.scene.names == other.found.scene.names
+        assert one.found.scene.notes == other.found.scene.notes
+        left_out.append(sum("plate" in pair for pair in one.found.scene.names))
+    assert left_out[0] == left_out[3] > left_out[1] == left_out[2]
+
+
 def test_an_obstacle_that_is_moved_is_where_it_stands_now(robot):
     wall = nmm.Obstacle(nmm.Box([0.2, 4.0, 2.0]), [3.0, 0.0, 0.5], name="wall")
     planner = nmm.Planner(robot, [wall], limits=LIMITS)

@@ -71,6 +71,28 @@ def test_what_is_free_of_a_plan_spares_looks_at_motions():
     assert np.median(spared) < 0.5 * np.median(new)
 
 
+def test_own_shapes_may_be_as_near_as_the_plan_has_them():
+    """A UR5 folded until its upper arm is 30 mm from its mount, by way of a posture where it is farther: from
+    there the plan's own end is reached, and however often it is planned anew nothing comes nearer."""
+    ur5 = "package://example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
+    robot = nmm.mount(nmm.load("differential_base", platform="unicycle"), nmm.load(ur5), prefix="ur5_")
+    start = {"ur5_shoulder_lift_joint": -2.2, "ur5_elbow_joint": 2.0, "ur5_wrist_1_joint": -1.5}
+    upright = {"x": 1.0, "y": 0.0, "theta": 0.0, "ur5_shoulder_lift_joint": -1.55, "ur5_elbow_joint": 1.55}
+    folded = {"x": 3.0, "y": 0.0, "theta": 0.0, "ur5_shoulder_lift_joint": -2.65, "ur5_elbow_joint": 2.4}
+    post = nmm.Obstacle(nmm.Cylinder(0.1, 1.0), [2.0, 1.5, 0.5], name="post")
+    limits = nmm.Limits(velocity={"platform": 1.0, "arm": 1.5}, acceleration=2.0)
+    on = plan = nmm.plan(robot, start, folded, [post], limits=limits, through=[upright])
+    pair = "arm_mount", "ur5_upper_arm_link"
+    stood = plan.corners[np.abs(plan.corners[:, 0] - 1.0).argmin()]
+    for k in range(4):
+        moved = nmm.Obstacle(post.shape, [2.0, 1.5 + 0.02 * k, 0.5], name="post")
+        q = stood if k == 0 else on(0.1 * on.duration)[0][0]
+        on = nmm.replan(on, q, [moved], seconds=3.0)
+        check(on, limits=limits)
+        assert ends_as(on, plan)
+        assert on.found.nearer[pair] == pytest.approx(plan.found.nearer[pair], abs=1e-12)
+
+
 def test_a_plan_of_a_plan_goes_on(plans):
     on = nmm.replan(plans[0], beside(plans[0], 0.3))
     again = nmm.replan(on, on(0.5 * on.duration)[0][0])

@@ -1,6 +1,9 @@
 """Whether configurations and motions keep a scene's distances, with obstacles that stand: for planners."""
 
-from collections.abc import Callable
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -16,7 +19,7 @@ from nmm.model.collisions.separation import ConvexShapes
 from nmm.model.collisions.shapes import HalfSpace
 from nmm.model.robots.robot import Robot
 from nmm.plugins.planning.collisions.legs_check import MARGIN, MovedShapes, first_blocked, too_near
-from nmm.plugins.planning.collisions.own_parts import own_parts, shape_parts
+from nmm.plugins.planning.collisions.own_parts import own_parts, place_on, shape_parts
 
 #: The direction that separates a pair before the first look.
 UP = (0.0, 0.0, 1.0)
@@ -58,16 +61,32 @@ class MotionCheck:
         self.blocks = memory.blocks()
         self._shapes = views(MovedShapes, *self.blocks, 0)
 
+    def among(self, scene: Scene) -> MotionCheck:
+        """The same in memory of its own, of a scene that is this one's `moved`."""
+        other = copy(self)
+        other.scene, other._measure = scene, None
+        other.blocks = Blocks(self.blocks.integers.copy(), self.blocks.floats.copy())
+        other._shapes = views(MovedShapes, *other.blocks, 0)
+        first = len(scene.shapes.geometryObjects) - len(scene.obstacles)
+        for j, obstacle in enumerate(scene.obstacles, first):
+            other._shapes.place[j] = place_on(scene.robot.joint_axes[0], obstacle.at(0.0))
+        return other
+
     def stay(self, limits: Array) -> None:
         """Keep a platform's x, y and theta within limits (3, 2), m and rad, on legs."""
         self._shapes.stays[:] = limits
 
-    def keep(self, configurations: Array) -> None:
-        """Keep the scene's distance, or what these (K, n) have where that is less."""
+    def keep(self, configurations: Array, nearer: Mapping[tuple[str, str], float] | None = None) -> None:
+        """Keep the scene's distance, or what these (K, n) have where that is less; of pairs by name that may
+        be `nearer`, m, that is enough."""
         if self.scene is None:
             return
         least = self._least(self.scene, configurations, self.scene.distance)
-        self.kept[:] = np.clip(least - 4.0 * MARGIN, 0.0, self.scene.distance)
+        kept = np.clip(least - 4.0 * MARGIN, 0.0, self.scene.distance)
+        if nearer:
+            enough = np.array([nearer.get(names, np.inf) for names in self.scene.names]) + MARGIN
+            kept = np.where(least > enough + MARGIN, enough, np.minimum(kept, enough))
+        self.kept[:] = kept
 
     def widen(self, configurations: Array, margin: float) -> None:
         """Keep so much more than the scene's distance, m, or as much as these (K, n) have."""
@@ -78,7 +97,7 @@ class MotionCheck:
     def _least(self, scene: Scene, configurations: Array, most: float) -> Array:
         """The least distance of each pair, (P,), m; a lower bound where a pair surely keeps so much."""
         if self._measure is None:
-            self._measure = measured_pairs(scene.robot, scene.shapes, pairs_of(scene.shapes), scene.boxes)
+            self._measure = measured_pairs(scene.robot, scene.shapes, self.pairs, scene.boxes)
         measure, enough = self._measure, most + 4.0 * MARGIN
         least = np.asarray(np.min([measure(q, enough) for q in configurations], axis=0))
         sensed = np.flatnonzero(self._shapes.sensed.row[self.pairs[:, 1]] >= 0)

@@ -68,13 +68,16 @@ def edges_of(geometry: Any) -> tuple[tuple[int, ...], ...]:
     return tuple(tuple(sorted(other)) for other in ends)
 
 
+def place_on(axes: pin.SE3, placement: pin.SE3) -> Array:
+    """Where a shape is on a joint with these axes, (12,), of its placement on Pinocchio's."""
+    return as_row(axes.inverse() * placement)
+
+
 def shape_parts(objects: Any, carrier: Integers, joint_axes: list[pin.SE3], boxes: Array) -> ShapeParts:
     """Those of shapes that these joints carry, with the boxes around them."""
     rounded = [corners_of(shape.geometry) for shape in objects]
     discs = [shape.geometry.radius if isinstance(shape.geometry, coal.Cylinder) else 0.0 for shape in objects]
-    places = [
-        as_row(joint_axes[i].inverse() * shape.placement) for i, shape in zip(carrier, objects, strict=True)
-    ]
+    places = [place_on(joint_axes[i], shape.placement) for i, shape in zip(carrier, objects, strict=True)]
     return ShapeParts(
         boxes=boxes,
         corners=tuple(corners for corners, _ in rounded),
