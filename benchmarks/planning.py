@@ -24,7 +24,7 @@ import numpy as np
 import pinocchio as pin
 
 import nmm
-from nmm.plugins.planning import search
+from nmm.plugins.planning import planned
 
 DISTANCE = 0.03
 #: Among what moves, how long it is looked at after the end of its motion, s.
@@ -364,9 +364,9 @@ def main() -> None:
     parser.add_argument("kinds", nargs="*", choices=[[], *KINDS], default=[])
     parser.add_argument("--only", choices=["rests", "smooth"])
     parser.add_argument("--prepared", action="store_true")
-    parser.add_argument("--ways", type=int, default=search.WAYS)
+    parser.add_argument("--ways", type=int, default=planned.WAYS)
     given = parser.parse_args()
-    search.WAYS = given.ways
+    planned.WAYS = given.ways
     print(f"{given.instances} instances of each, seed {given.seed}")
     for kind in (u_shaped_wall, table, trailers):  # what is compiled once is no part of a plan
         nmm.plan(*kind(np.random.default_rng(0))[:4], smooth=True)
