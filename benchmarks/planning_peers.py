@@ -6,16 +6,17 @@ OMPL (not one of nmm's dependencies: pip install ompl) plans by RRT-Connect and 
 words of Reeds and Shepp and lines of the arm, to the same goal postures, with the same least radius, weights
 and bounds. A configuration is valid where nmm's compiled check says so (`too_near`), every hundredth of the
 space's extent, as OMPL has it. Its path is timed along the limits like nmm's. `free` counts what Coal finds
-free at 2,000 times along the motion (`planning.checked`), `touch` what comes nearer than 0. Control reacts
-with limits, distances, clearance and retreats; where the goal is a pose of the platform, which no feedback
-reaches, it is asked for the end-effector's position there.
+free at 2,000 times along the motion (`planning.checked`), `touch` what comes nearer than 0; `prepared` is the
+second plan of an `nmm.Planner`. Control reacts with limits, distances, clearance and retreats; where the goal
+is a pose of the platform, which no feedback reaches, it is asked for the end-effector's position there.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -50,8 +51,18 @@ def measured(scene: Scene, plan: nmm.Plan, seconds: float) -> Measured:
 
 
 def of_nmm(scene: Scene, seed: int) -> nmm.Plan:
-    given = scene.robot, scene.start, scene.goal, scene.obstacles, nmm.Collisions(DISTANCE), LIMITS
-    return nmm.plan(*given, seed=seed)
+    return nmm.plan(scene.robot, scene.start, scene.goal, *around(scene), seed=seed)
+
+
+def around(scene: Scene) -> tuple[list[nmm.Obstacle], nmm.Collisions, nmm.Limits]:
+    return scene.obstacles, nmm.Collisions(DISTANCE), LIMITS
+
+
+def of_planner(scene: Scene, seed: int) -> Callable[[], nmm.Plan]:
+    """The second plan of an `nmm.Planner`."""
+    planner = nmm.Planner(scene.robot, *around(scene))
+    planner.plan(scene.start, scene.goal, seed=seed + 1)
+    return partial(planner.plan, scene.start, scene.goal, seed=seed)
 
 
 def of_ompl(scene: Scene, seed: int) -> nmm.Plan:
@@ -169,18 +180,18 @@ def main() -> None:
     parser.add_argument("kinds", nargs="*", choices=[[], *KINDS], default=[])
     parser.add_argument("--reacting", type=int, default=20, help="instances for control that reacts")
     given = parser.parse_args()
-    planners = {"nmm": of_nmm}
+    planners = {"nmm": partial(partial, of_nmm), "prepared": of_planner}
     try:
         from ompl import util
 
         util.noOutputHandler()
         util.RNG.setSeed(given.seed + 1)
-        planners["OMPL"] = of_ompl
+        planners["OMPL"] = partial(partial, of_ompl)
     except ImportError:
         print("OMPL is not installed (pip install ompl): its rows are left out")
     for plan in planners.values():  # what is compiled or loaded once is no part of a plan
         for kind in ("u_shaped_wall", "table"):
-            plan(KINDS[kind](np.random.default_rng(0)), 0)
+            plan(KINDS[kind](np.random.default_rng(0)), 0)()
     print(
         f"{'':24}{'found':8}{'free':>5}{'touch':>6}{'s median':>9}{'worst':>8}{'motion':>8}{'m':>7}{'rad':>7}"
     )
@@ -189,13 +200,15 @@ def main() -> None:
             found = []
             for k in range(given.instances):
                 scene = KINDS[kind](np.random.default_rng([given.seed, k]))
-                begin = time.process_time()
                 try:
-                    made = plan(scene, k)
+                    make = plan(scene, k)
+                    begin = time.process_time()
+                    made = make()
                 except nmm.NmmError as error:
                     print(f"  {kind} {k}, {who}: {error}")
                     continue
-                found.append(measured(scene, made, time.process_time() - begin))
+                seconds = time.process_time() - begin
+                found.append(measured(scene, made, seconds))
             row(who, kind, given.instances, found)
         if given.reacting:
             scenes = (KINDS[kind](np.random.default_rng([given.seed, k])) for k in range(given.reacting))
