@@ -18,7 +18,7 @@ from nmm.base.kernels.record_layout import BLOCKS, Blocks, Memory, views
 from nmm.base.kernels.signatures import float64, void
 from nmm.model.collisions.elements.boxes import Elements
 from nmm.model.collisions.elements.cells import far_field
-from nmm.model.collisions.elements.nearest import cell_bound, measure_sensed, sensed_bound
+from nmm.model.collisions.elements.nearest import NEAR, cell_bound, measure_sensed, sensed_bound
 from nmm.model.collisions.elements.shapes_record import SensedShapes, covering, sensed_shapes
 from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.collisions.pairs import query_shapes
@@ -154,7 +154,7 @@ def test_a_shapes_distance_to_a_cloud_is_coals_to_its_nearest_point(name: str, p
     cloud = nmm.PointCloud(points, 0.01, placement=pose.homogeneous)
     pair = Pair(geometry, cloud)
     world = points @ pose.rotation.T + pose.translation
-    checked = 0
+    checked = followed = 0
     for at in poses(rng, 60):
         at = pose * at if placed else at
         near = world[np.linalg.norm(world - at.translation, axis=1) < 0.95]  # no shape's radius is 0.5
@@ -176,10 +176,12 @@ def test_a_shapes_distance_to_a_cloud_is_coals_to_its_nearest_point(name: str, p
         assert np.allclose(own + result[0] * normal, other, atol=1e-9)
         assert np.linalg.norm(world - (other + 0.01 * normal), axis=1).min() < 1e-9
         assert point_distances(geometry, at.actInv(own)[None])[0] == pytest.approx(0.0, abs=1e-6)
-        if exact < 0.15:
+        if exact < 0.03 + NEAR:
+            followed += 1
             assert bound >= 0.98 * exact - 2e-4
             assert direction @ normal < -0.99
     assert checked > 15
+    assert followed > 3
 
 
 @pytest.mark.parametrize("name", SHAPES)
