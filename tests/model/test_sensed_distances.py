@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import coal
@@ -231,9 +232,12 @@ def test_a_shapes_distance_to_voxels_columns_and_heights_is_coals_to_the_boxes(n
         assert checked > 3, obstacle
 
 
-def test_balls_cover_every_corner_and_face_of_a_robots_shapes() -> None:
+@pytest.mark.parametrize(
+    "make", [mounted, lambda: nmm.Scenario.load("tiago_shelf").robot()], ids=["ur5", "tiago"]
+)
+def test_balls_cover_every_corner_and_face_of_a_robots_shapes(make: Callable[[], nmm.Robot]) -> None:
     """Samples of each mesh's own corners and triangles, which its hull holds, and of primitives' surfaces."""
-    rng, robot = np.random.default_rng(5), mounted()
+    rng, robot = np.random.default_rng(5), make()
     meshes = 0
     for shape, convex in zip(
         robot.collision_model.geometryObjects, query_shapes(robot).geometryObjects, strict=True

@@ -17,7 +17,7 @@ from nmm.model.collisions.elements.boxes import Elements
 #: Kinds of the robot's shapes: boxes; spheres and capsules; cylinders; hulls of points.
 BOX, ROUND, DISC, HULL = 0, 1, 2, 3
 #: At most so many balls cover a shape along each axis; half of the boxes that they go around, m.
-ALONG, PIECE = 6, 0.06
+ALONG, PIECE = 6, 0.1
 
 
 class SensedShapes(NamedTuple):
