@@ -17,12 +17,12 @@ that a point of a face is from the nearest point of the scan without noise.
 from __future__ import annotations
 
 import argparse
-import resource
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import NamedTuple
 
 import coal
@@ -266,7 +266,9 @@ def peak(file: str) -> None:
         [nmm.PointCloud.load(file, radius=0.02)] if file else scene.obstacles,
         *(nmm.Collisions(DISTANCE), LIMITS),
     )
-    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)
+    # Not ru_maxrss, which begins with what the process had that started this one.
+    status = Path("/proc/self/status").read_text()
+    print(int(status.split("VmHWM:")[1].split()[0]) / 1024.0)
 
 
 def memory() -> None:
