@@ -121,7 +121,8 @@ def find_near(integers: Integers, floats: Array, places: Array) -> int:
                 bound = max(bound, outside_box(places, boxes, i, centers, j) - boxes[j, 6])
             if bound < band and scene.sensed.row[j] >= 0:
                 into_axes(places, j, i, pose)
-                bound = max(bound, far_bound(scene.sensed, scene.sensed.row[j], pose, i))
+                far = far_bound(scene.sensed, scene.sensed.row[j], pose, i, math.inf, -math.inf)
+                bound = max(bound, far)
         scene.bounds[k] = bound
         near = 1 if bound < band else 0
         if near != scene.active[k]:

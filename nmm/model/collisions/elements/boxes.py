@@ -11,7 +11,7 @@ import numpy as np
 from nmm.base.arrays import Array, Flags, array, positive, scalar, unwritable, vector
 from nmm.base.errors import InputError, expect
 from nmm.model.collisions.elements.cell_mesh import cell_mesh
-from nmm.model.collisions.elements.cells import Cells, sorted_cells
+from nmm.model.collisions.elements.cells import Cells, ends, sorted_cells
 from nmm.model.collisions.shapes import Shape, hull
 
 #: Edge of the cells that points are sorted into, m.
@@ -55,8 +55,7 @@ class Elements(Shape):
             self.halves = np.broadcast_to(array(halves, "elements: halves"), self.centres.shape)
         edges = vector(cell, 3, "elements: cell")
         self.cell = np.array([positive(edge, "elements: cell") for edge in edges])
-        least = self.centres.min(axis=0)
-        self.corner = least if corner is None else vector(corner, 3, "elements: corner")
+        self.corner = ends(self.centres)[0] if corner is None else vector(corner, 3, "elements: corner")
         self.inside = None if inside is None else array(inside, "elements: inside").reshape(-1, 3)
         if self.halves is not None:
             index = np.floor((self.centres - self.corner) / self.cell)
@@ -69,8 +68,9 @@ class Elements(Shape):
     @cached_property
     def box(self) -> tuple[Array, Array]:
         """The least and the greatest coordinates of all of it, (3,) each, m."""
-        halves = 0.0 if self.halves is None else self.halves
-        low, high = (self.centres - halves).min(axis=0), (self.centres + halves).max(axis=0)
+        low, high = ends(self.centres)
+        if self.halves is not None:
+            low, high = ends(self.centres - self.halves)[0], ends(self.centres + self.halves)[1]
         return low - self.radius, high + self.radius
 
     @property
@@ -99,8 +99,8 @@ class Elements(Shape):
         """A box around all of it, which says where it is; distances to it are of `cells`."""
         low, high = self.box
         thick = max(THIN, THIN * float(np.max(high - low)))
-        ends = np.array([low - thick, high + thick])
-        return hull(np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i, j, k in np.ndindex(2, 2, 2)]))
+        both = np.array([low - thick, high + thick])
+        return hull(np.array([[both[i, 0], both[j, 1], both[k, 2]] for i, j, k in np.ndindex(2, 2, 2)]))
 
     def drawn(self) -> Any:
         """The outer faces of cells with elements, larger cells where there would be too many faces."""

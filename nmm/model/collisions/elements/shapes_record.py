@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import coal
 import numpy as np
 
-from nmm.base.arrays import Array
+from nmm.base.arrays import Array, unwritable
 from nmm.base.kernels.pointers import address_of
 from nmm.base.kernels.record_layout import IntegerMatrix, IntegerVector, Matrix
 from nmm.model.collisions.elements.boxes import Elements
@@ -16,7 +17,7 @@ from nmm.model.collisions.elements.boxes import Elements
 #: Kinds of the robot's shapes: boxes; spheres and capsules; cylinders; hulls of points.
 BOX, ROUND, DISC, HULL = 0, 1, 2, 3
 #: At most so many balls cover a shape along each axis; half of the boxes that they go around, m.
-ALONG, PIECE = 6, 0.06
+ALONG, PIECE = 6, 0.1
 
 
 class SensedShapes(NamedTuple):
@@ -114,15 +115,22 @@ def _described(geometry: Any) -> tuple[int, Array, Array, tuple[float, float], A
 def covering(geometry: Any) -> Array:
     """Balls (B, 4), centre and radius, m, that cover a convex shape of Coal's, in its axes: around the parts
     into which planes cut its box, where a part can meet it."""
-    _, box, _, (radius, _half), points = _described(geometry)
+    _, box, _, (radius, _), points = _described(geometry)
     if isinstance(geometry, coal.Sphere):
         return np.array([[0.0, 0.0, 0.0, radius]])
+    return _covering(box.tobytes(), radius, points.tobytes())
+
+
+@lru_cache(maxsize=256)
+def _covering(box_data: bytes, radius: float, corners: bytes) -> Array:
+    """The same of what is not a sphere, kept: a robot's shapes are covered anew for each scene."""
+    box, points = np.frombuffer(box_data), np.frombuffer(corners).reshape(-1, 3)
     parts = np.clip(np.ceil(box[3:] / PIECE), 1, ALONG).astype(int)
     if radius:  # slices along z
         count = int(np.clip(np.ceil(box[5] / radius), 1, 2 * ALONG))
         z = (np.arange(count) + 0.5) / count * 2.0 - 1.0
         far = float(np.hypot(radius, box[5] / count))
-        return np.array([[0.0, 0.0, box[5] * share, far] for share in z])
+        return unwritable(np.array([[0.0, 0.0, box[5] * share, far] for share in z]))
     edges = box[3:] / parts
     grid = np.array([*np.ndindex(*parts)])
     centres = box[:3] - box[3:] + (2.0 * grid + 1.0) * edges
@@ -132,4 +140,4 @@ def covering(geometry: Any) -> Array:
 
         planes = ConvexHull(points).equations
         centres = centres[(centres @ planes[:, :3].T + planes[:, 3]).max(axis=1) <= far + 1e-9]
-    return np.column_stack([centres, np.full(len(centres), far)])
+    return unwritable(np.column_stack([centres, np.full(len(centres), far)]))

@@ -71,11 +71,14 @@ class PointCloud(Obstacle):
         name = name or "point cloud"
         where = f"obstacle {name}: points"
         rows = _rows(points, where)
-        finite = np.isfinite(rows).all(axis=1)
-        self.left_out = int(len(rows) - np.count_nonzero(finite))
-        rows = np.asarray(rows[finite] if self.left_out else rows, dtype=np.float64)
+        self.left_out = 0
+        if rows.dtype.kind == "f" and not np.isfinite([rows.min(initial=0.0), rows.max(initial=0.0)]).all():
+            finite = np.isfinite(rows).all(axis=1)
+            self.left_out = int(len(rows) - np.count_nonzero(finite))
+            rows = rows[finite]
+        rows = np.asarray(rows, dtype=np.float64)
         expect(len(rows), where, "at least one point of finite coordinates")
-        far = float(np.abs(rows).max())
+        far = float(max(-rows.min(), rows.max()))
         expect(far <= FARTHEST, where, f"coordinates within {FARTHEST:g} m", far)
         radius = scalar(radius, f"obstacle {name}: radius", least=0.0)
         cell = positive(cell, f"obstacle {name}: cell")

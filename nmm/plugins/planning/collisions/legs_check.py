@@ -259,9 +259,7 @@ def look(scene: MovedShapes, q: Array, leg: Array, share: float, joints: Array, 
     rates are no larger."""
     twists = scratch((joints.shape[0], 6))
     place_joints(scene.joints, q, joints)
-    if steady == 1:
-        axes(scene.joints, joints, twists)
-    following = math.inf
+    following, turning = math.inf, 0
     for pair in range(scene.kept.shape[0]):
         if scene.until[pair] <= share:
             least = scene.kept[pair]
@@ -273,6 +271,9 @@ def look(scene: MovedShapes, q: Array, leg: Array, share: float, joints: Array, 
             # The second is of convex shapes: of points that were sensed each has a direction of its own.
             convex = scene.sensed.row[scene.shapes.pairs[pair, 1]] < 0
             if steady == 1 and convex and share + free < 1.0:
+                if turning == 0:
+                    axes(scene.joints, joints, twists)
+                    turning = 1
                 speed = speed_towards(scene, q, leg, joints, twists, pair)
                 if scene.bends[pair] < 0.0:
                     scene.bends[pair] = bend(scene, pair, leg)
