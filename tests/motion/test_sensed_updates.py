@@ -141,3 +141,28 @@ def test_other_threads_run_while_a_field_is_made() -> None:
         count += 1
     thread.join()
     assert count > 1000
+
+
+def test_a_horizon_looks_at_a_map_that_turns_where_it_will_be() -> None:
+    robot = nmm.load("unicycle_3r")
+    beam = nmm.OccupancyMap(np.full((2, 60), 100), 0.05, [0.0, 0.0, 0.0], height=0.5, name="beam")
+    task = nmm.Task(nmm.Position("ee", "xy"), [-3.0, 0.0])
+    collisions = nmm.Collisions(0.03, self_collisions=False, obstacles=[beam])
+    horizon = nmm.Horizon(robot, task, collisions, dt=0.1)
+    beam.move_to([2.0, 0.0, 0.0], [0.1, 0.0, 0.0, 0.0, 0.0, 0.3])
+    horizon._place_movers(0.0)
+    for time, track in zip(horizon._times, horizon._x.tracks[:, 0], strict=True):
+        placed = beam.going_on(0.0).placement(float(time))
+        assert np.allclose(track[:9].reshape(3, 3).T, placed[:3, :3])
+        assert np.allclose(track[9:], placed[:3, 3])
+        assert np.arctan2(placed[1, 0], placed[0, 0]) == pytest.approx(0.3 * time)
+    # Its far end is 3 m from where it turns.
+    assert horizon._x.drift.max() >= 0.3 * 3.0 * np.diff(horizon._times).max()
+
+
+def test_an_obstacle_that_is_set_goes_on_as_it_turns() -> None:
+    beam = nmm.Obstacle(nmm.Box([3.0, 0.1, 0.5]), [1.0, 0.0, 0.0], name="beam")
+    beam.move_to([1.0, 0.0, 0.0], [0.0, 0.2, 0.0, 0.0, 0.0, 0.3])
+    later = beam.going_on(2.0).placement(4.0)
+    assert np.allclose(later[:3, 3], [1.0, 0.4, 0.0])
+    assert np.arctan2(later[1, 0], later[0, 0]) == pytest.approx(0.6)
