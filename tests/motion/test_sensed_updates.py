@@ -13,6 +13,7 @@ import nmm
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError
 from nmm.base.kernels.pointers import address_of
+from nmm.model.collisions.elements import Elements
 from nmm.model.collisions.elements.field import transform
 
 #: Three standard deviations of the noise of scans.
@@ -95,6 +96,23 @@ def test_what_is_no_scan_is_refused_and_the_earlier_points_stay() -> None:
     assert np.array_equal(again.points, scan(2))
     again.update([[1.0, 0.0, 0.0]], wait=True)
     assert len(again.points) == 1
+
+
+def test_an_updated_cloud_is_what_a_new_one_would_be() -> None:
+    points = scan(3)
+    points[::7] = np.nan
+    cloud = nmm.PointCloud(scan(0), radius=0.025)
+    cloud.update(points, wait=True)
+    fresh = nmm.PointCloud(points, radius=0.025)
+    assert cloud.left_out == fresh.left_out > 0
+    assert np.array_equal(cloud.points, fresh.points)
+    ours, theirs = cloud.shape, fresh.shape
+    assert isinstance(ours, Elements)
+    assert isinstance(theirs, Elements)
+    assert np.array_equal(ours.box, theirs.box)
+    for array, other in zip(ours.cells, theirs.cells, strict=True):
+        assert np.array_equal(array, other)
+        assert array.dtype == other.dtype
 
 
 def test_a_planner_keeps_off_a_cloud_as_it_is_now() -> None:
