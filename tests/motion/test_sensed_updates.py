@@ -13,6 +13,7 @@ import nmm
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError
 from nmm.base.kernels.pointers import address_of
+from nmm.model.collisions.elements import Elements
 from nmm.model.collisions.elements.field import transform
 
 #: Three standard deviations of the noise of scans.
@@ -97,6 +98,23 @@ def test_what_is_no_scan_is_refused_and_the_earlier_points_stay() -> None:
     assert len(again.points) == 1
 
 
+def test_an_updated_cloud_is_what_a_new_one_would_be() -> None:
+    points = scan(3)
+    points[::7] = np.nan
+    cloud = nmm.PointCloud(scan(0), radius=0.025)
+    cloud.update(points, wait=True)
+    fresh = nmm.PointCloud(points, radius=0.025)
+    assert cloud.left_out == fresh.left_out > 0
+    assert np.array_equal(cloud.points, fresh.points)
+    ours, theirs = cloud.shape, fresh.shape
+    assert isinstance(ours, Elements)
+    assert isinstance(theirs, Elements)
+    assert np.array_equal(ours.box, theirs.box)
+    for array, other in zip(ours.cells, theirs.cells, strict=True):
+        assert np.array_equal(array, other)
+        assert array.dtype == other.dtype
+
+
 def test_a_planner_keeps_off_a_cloud_as_it_is_now() -> None:
     robot = nmm.load("unicycle_3r")
     start, goal = {"x": 0.3, "y": -0.9, "q1": 0.5}, {"x": 4.0, "y": 0.6, "theta": 0.0}
@@ -141,3 +159,28 @@ def test_other_threads_run_while_a_field_is_made() -> None:
         count += 1
     thread.join()
     assert count > 1000
+
+
+def test_a_horizon_looks_at_a_map_that_turns_where_it_will_be() -> None:
+    robot = nmm.load("unicycle_3r")
+    beam = nmm.OccupancyMap(np.full((2, 60), 100), 0.05, [0.0, 0.0, 0.0], height=0.5, name="beam")
+    task = nmm.Task(nmm.Position("ee", "xy"), [-3.0, 0.0])
+    collisions = nmm.Collisions(0.03, self_collisions=False, obstacles=[beam])
+    horizon = nmm.Horizon(robot, task, collisions, dt=0.1)
+    beam.move_to([2.0, 0.0, 0.0], [0.1, 0.0, 0.0, 0.0, 0.0, 0.3])
+    horizon._place_movers(0.0)
+    for time, track in zip(horizon._times, horizon._x.tracks[:, 0], strict=True):
+        placed = beam.going_on(0.0).placement(float(time))
+        assert np.allclose(track[:9].reshape(3, 3).T, placed[:3, :3])
+        assert np.allclose(track[9:], placed[:3, 3])
+        assert np.arctan2(placed[1, 0], placed[0, 0]) == pytest.approx(0.3 * time)
+    # Its far end is 3 m from where it turns.
+    assert horizon._x.drift.max() >= 0.3 * 3.0 * np.diff(horizon._times).max()
+
+
+def test_an_obstacle_that_is_set_goes_on_as_it_turns() -> None:
+    beam = nmm.Obstacle(nmm.Box([3.0, 0.1, 0.5]), [1.0, 0.0, 0.0], name="beam")
+    beam.move_to([1.0, 0.0, 0.0], [0.0, 0.2, 0.0, 0.0, 0.0, 0.3])
+    later = beam.going_on(2.0).placement(4.0)
+    assert np.allclose(later[:3, 3], [1.0, 0.4, 0.0])
+    assert np.arctan2(later[1, 0], later[0, 0]) == pytest.approx(0.6)

@@ -126,6 +126,17 @@ class Obstacle:
         other.move_to(placement)
         return other
 
+    def going_on(self, t: float) -> Obstacle:
+        """One that moves on from where this one is at t, s, with the velocity that `move_to` set."""
+        pose, twist = self.at(t), self.twist(t)
+
+        def motion(time: float) -> Array:
+            turned = pin.exp3((time - t) * twist[3:]) @ pose.rotation
+            place: Array = pin.SE3(turned, pose.translation + (time - t) * twist[:3]).homogeneous
+            return place
+
+        return Obstacle(self.shape, motion=motion, name=self.name)
+
     def at(self, t: float) -> Any:
         """As `placement`, Pinocchio's; the same object as long as nothing sets it."""
         return self._placement if self.motion is None else self._checked(self._moved(self.motion, t))

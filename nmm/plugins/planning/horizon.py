@@ -259,9 +259,11 @@ class Horizon:
         """Where obstacles are from t on: by their motions, else along their velocities."""
         x, second = self._x, self._check.pairs[:, 1]
         for i, (shape, obstacle) in enumerate(self._movers):
-            if obstacle.moves:
-                x.tracks[:, i] = [as_row(obstacle.at(float(time))) for time in t + self._times]
-                far = shifts([obstacle], t + self._times)
+            turns = not obstacle.moves and obstacle.twist(t)[3:].any()
+            mover = obstacle.going_on(t) if turns else obstacle
+            if mover.moves:
+                x.tracks[:, i] = [as_row(mover.at(float(time))) for time in t + self._times]
+                far = shifts([mover], t + self._times)
             else:
                 x.tracks[:, i] = as_row(obstacle.at(t))
                 x.tracks[:, i, 9:] += np.outer(self._times, obstacle.twist(t)[:3])

@@ -11,7 +11,7 @@ import numpy as np
 from nmm.base.arrays import Array, Flags, array, positive, scalar, unwritable, vector
 from nmm.base.errors import InputError, expect
 from nmm.model.collisions.elements.cell_mesh import cell_mesh
-from nmm.model.collisions.elements.cells import Cells, ends, sorted_cells
+from nmm.model.collisions.elements.cells import Cells, cells_of_scan, ends, sorted_cells
 from nmm.model.collisions.shapes import Shape, hull
 
 #: Edge of the cells that points are sorted into, m.
@@ -62,6 +62,18 @@ class Elements(Shape):
             off = np.abs(self.centres - self.corner - (index + 0.5) * self.cell) + self.halves
             expect(np.all(off <= 0.5 * self.cell + 1e-9), "elements: halves", "boxes within their cells")
 
+    @classmethod
+    def of_scan(cls, rows: Array, radius: float, cell: Array) -> tuple[Elements | None, float]:
+        """Points (N, 3) without those that are not finite, and the largest coordinate, m; mostly made without
+        Python's lock. None where there are none, or too many cells."""
+        points, extent, cells = cells_of_scan(np.ascontiguousarray(rows, dtype=np.float64), cell)
+        if cells is None:
+            return None, np.inf
+        made = cls(points[:1], None, radius, cell, cells.corner)
+        made.centres, made._cells = unwritable(points), cells
+        made.__dict__["box"] = extent[:3] - radius, extent[3:] + radius
+        return made, float(np.abs(extent).max())
+
     def __repr__(self) -> str:
         return f"Elements({len(self.centres)}, radius={self.radius:g})"
 
@@ -79,7 +91,11 @@ class Elements(Shape):
         if self._cells is None:
             with _MAKING:  # records have their addresses: a second thread is not to replace them
                 if self._cells is None:
-                    made = sorted_cells(self.centres, self.halves, self.cell, self.corner, self.inside)
+                    made = None
+                    if self.halves is None and np.array_equal(self.corner, self.centres.min(axis=0)):
+                        made = cells_of_scan(self.centres, self.cell)[2]
+                    if made is None:
+                        made = sorted_cells(self.centres, self.halves, self.cell, self.corner, self.inside)
                     self._cells = made
         return self._cells
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from nmm.base.arrays import Array, Flags
 from nmm.base.kernels.pointers import address_of
-from nmm.model.collisions.elements.field import sort_into_cells, transform
+from nmm.model.collisions.elements.field import mark_full, sort_into_cells, take_finite, transform
 
 #: More cells than this are made larger, in whole multiples.
 MOST = 8_000_000
@@ -93,6 +93,22 @@ def sort_points(
     return starts[:-1], order, placed
 
 
+def cells_of_scan(rows: Array, cell: Array) -> tuple[Array, Array, Cells | None]:
+    """The finite ones of points (N, 3), their least and greatest coordinates (6,), and their cells; all that
+    takes long without Python's lock. None for no points, and for more cells than `MOST`."""
+    room, extent = np.empty_like(rows), np.empty(6)
+    count = take_finite(np.array([address_of(rows), address_of(room)], dtype=np.int64), len(rows), extent)
+    points, low = room[:count], extent[:3].copy()
+    if not count or float(np.prod(np.floor((extent[3:] - low) / cell) + 1.0)) > MOST:
+        return points, extent, None
+    counts = np.floor((extent[3:] - low) / cell).astype(np.int64) + 1
+    starts, _, placed = sort_points(points, low, cell, counts)
+    field = np.empty(counts, dtype=np.float32)
+    mark_full(np.array([address_of(starts), address_of(field)], dtype=np.int64), field.size)
+    _spread(field, cell)
+    return points, extent, Cells(low, cell, starts, placed, np.zeros((0, 3)), field)
+
+
 def _numbers(points: Array, corner: Array, cell: Array, counts: NDArray[np.int64]) -> NDArray[np.int64]:
     index = np.floor((points - corner) / cell).astype(np.int64)
     np.clip(index, 0, counts - 1, out=index)
@@ -107,7 +123,11 @@ def far_field(full: Flags, cell: Array) -> NDArray[np.float32]:
     the nearest one among the full cells grown by their 26 neighbours.
     """
     field = np.where(full, np.float32(0.0), np.float32(np.inf))
-    counts = np.array(full.shape, dtype=np.int64)
+    _spread(field, cell)
+    return field
+
+
+def _spread(field: NDArray[np.float32], cell: Array) -> None:
+    counts = np.array(field.shape, dtype=np.int64)
     work = np.empty((4, int(counts.max()) + 1))
     transform(address_of(field), counts, np.array(cell), work, 1.0 - ROUNDED)
-    return field

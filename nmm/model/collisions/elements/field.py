@@ -44,6 +44,38 @@ def sort_into_cells(addresses: Integers, counts: Integers, corner: Array, cell: 
 
 
 @compiled_without_gil
+def take_finite(addresses: Integers, count: int, ends: Array) -> int:
+    """Copy the points that are finite, and return their number.
+
+    addresses (2,) : of points (count, 3) and room for them, float64; ends (6,) : their least and greatest
+        coordinates, m
+    """
+    points, out = doubles_at(addresses[0], 3 * count), doubles_at(addresses[1], 3 * count)
+    taken = 0
+    for k in range(3):
+        ends[k], ends[3 + k] = math.inf, -math.inf
+    for e in range(count):
+        x, y, z = points[3 * e], points[3 * e + 1], points[3 * e + 2]
+        if not math.isfinite(x + y + z):
+            continue
+        for k in range(3):
+            at = points[3 * e + k]
+            out[3 * taken + k] = at
+            ends[k], ends[3 + k] = min(ends[k], at), max(ends[3 + k], at)
+        taken += 1
+    return taken
+
+
+@compiled_without_gil
+def mark_full(addresses: Integers, total: int) -> None:
+    """0 in a field (total,), float32, of cells with elements, infinity of others; addresses (2,) : of starts,
+    int32, and the field."""
+    starts, field = short_integers_at(addresses[0], total + 1), singles_at(addresses[1], total)
+    for k in range(total):
+        field[k] = 0.0 if starts[k + 1] > starts[k] else math.inf
+
+
+@compiled_without_gil
 def transform(address: int, counts: Integers, cell: Array, work: Array, share: float) -> None:
     """Make a field of 0 in full cells and infinity elsewhere that of lower bounds, in place: `share` of
     sqrt(sum (max(|i - j| - 1, 0) h)²), least over full cells.

@@ -174,14 +174,16 @@ class PointCloud(Obstacle):
                     self._worker = None
                     return
             try:
-                made = PointCloud(rows, self.radius, self.name, cell=self._cell)
-                _ = made._elements.cells, made._elements.box  # before anybody asks for them
+                made, far = Elements.of_scan(rows, self.radius, np.full(3, self._cell))
+                if made is None or far > FARTHEST:  # says what is wrong, or takes its time
+                    made = PointCloud(rows, self.radius, self.name, cell=self._cell)._elements
+                    _ = made.cells, made.box  # before anybody asks for them
             except Exception as error:  # told by the next call: nothing else sees this thread
                 fault = error if isinstance(error, InputError) else InputError(one_line(str(error)))
                 with _UPDATING:
                     self._fault = fault
                 continue
-            self.shape, self.left_out = made.shape, made.left_out
+            self.shape, self.left_out = made, len(rows) - len(made.centres)
 
     def transformed(self, T: ArrayLike) -> PointCloud:
         """The cloud with its points in other axes.
