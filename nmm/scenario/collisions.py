@@ -12,7 +12,7 @@ from nmm.control.functions.program import Program
 from nmm.control.functions.references.orientation import rotation_vector
 from nmm.control.limits.collisions import Collisions
 from nmm.model.collisions.obstacle import Obstacle
-from nmm.model.collisions.sensed import OccupancyMap, PointCloud, VoxelMap
+from nmm.model.collisions.sensed import ElevationMap, OccupancyMap, PointCloud, VoxelMap
 from nmm.model.collisions.shapes import Box, Capsule, ConvexMesh, Cylinder, HalfSpace, Shape, Sphere
 from nmm.model.robots.loading.packages import package_file
 from nmm.model.robots.robot import Robot
@@ -132,11 +132,20 @@ class VoxelMapPart(SensedPart):
     file: FileName = Field(description="a .bt file, relative to the scenario")
 
 
+class ElevationMapPart(SensedPart):
+    """The ground below the heights of a file."""
+
+    loads = ElevationMap.load
+    kind: Literal["elevation_map"]
+    file: FileName = Field(description="NPZ of heights, resolution and origin, relative to the scenario")
+
+
 #: What obstacles may be, beside shapes that are drawn.
 OBSTACLE_PARTS: dict[str, type[ShapePart]] = SHAPE_PARTS | {
     "point_cloud": PointCloudPart,
     "occupancy_map": OccupancyMapPart,
     "voxel_map": VoxelMapPart,
+    "elevation_map": ElevationMapPart,
 }
 
 
@@ -176,8 +185,8 @@ class ObstaclePart(KeyedPart):
 
     name: str = Field("", description="for messages; the shape's kind when not given")
     shape: Annotated[ShapePart, OneOf(OBSTACLE_PARTS)] = Field(
-        description="kind box, sphere, cylinder, capsule, plane, mesh, point_cloud, occupancy_map or "
-        "voxel_map, with its keys"
+        description="kind box, sphere, cylinder, capsule, plane, mesh, point_cloud, occupancy_map, "
+        "voxel_map or elevation_map, with its keys"
     )
     xyz: Three | None = Field(None, description="its origin in the world, m; 0, 0, 0 when not given")
     rpy: Three = Field([0.0, 0.0, 0.0], description="roll, pitch, yaw about fixed axes, rad")

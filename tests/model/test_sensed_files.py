@@ -386,3 +386,26 @@ def test_cells_of_the_surface_are_those_beside_one_that_is_not_full() -> None:
             padded[i + 1, j + 2, k + 1], padded[i + 1, j + 1, k], padded[i + 1, j + 1, k + 2],
         ]  # fmt: skip
         assert surface(full)[i, j, k] == (full[i, j, k] and not all(beside))
+
+
+def test_heights_of_a_file(tmp_path):
+    file = tmp_path / "ramp.npz"
+    heights = np.arange(12.0).reshape(3, 4) / 20.0
+    np.savez(file, heights=heights, resolution=0.1, origin=[1.0, 2.0, 0.2])
+    ground = nmm.ElevationMap.load(file)
+    assert ground.name == "ramp"
+    np.testing.assert_array_equal(ground.heights, heights)
+    np.testing.assert_array_equal(ground.origin, [1.0, 2.0, 0.2])
+    np.savez(file, heights=heights)
+    with pytest.raises(nmm.InputError, match=r"ramp\.npz: expected the array resolution.*heights"):
+        nmm.ElevationMap.load(file)
+    np.savez(file, heights=heights, resolution=[0.1, 0.1])
+    with pytest.raises(nmm.InputError, match="resolution"):
+        nmm.ElevationMap.load(file)
+    file.write_bytes(b"PK nothing")
+    with pytest.raises(nmm.InputError, match=r"ramp\.npz: damaged, or no NPZ"):
+        nmm.ElevationMap.load(file)
+    with pytest.raises(nmm.InputError, match=r"expected a \.npz file"):
+        nmm.ElevationMap.load("ramp.tif")
+    with pytest.raises(nmm.InputError, match=r"gone\.npz: cannot be read"):
+        nmm.ElevationMap.load(tmp_path / "gone.npz")

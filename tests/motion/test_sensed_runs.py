@@ -178,6 +178,7 @@ def test_a_scenario_names_the_files_of_clouds_and_maps(tmp_path: Path) -> None:
         "image: room.png\nresolution: 0.1\norigin: [5.0, -1.0, 0.5]\nnegate: 0\n"
         "free_thresh: 0.196\noccupied_thresh: 0.65\n"
     )
+    np.savez(tmp_path / "slope.npz", heights=np.full((4, 5), 0.3), resolution=0.2, origin=[7.0, 7.0])
     (tmp_path / "door.yaml").write_text(
         "name: door\nrobot: unicycle_3r\nq0: {q1: 0.3, q2: 0.6}\nduration: 0.2\ndt: 0.02\n"
         "task: [{kind: position, frame: ee, axes: xy, reference: {kind: constant, value: [1.0, 0.0]}}]\n"
@@ -185,9 +186,11 @@ def test_a_scenario_names_the_files_of_clouds_and_maps(tmp_path: Path) -> None:
         "collisions:\n  obstacles:\n"
         "    - {name: wall, shape: {kind: point_cloud, file: scan.npz, radius: 0.03}, xyz: [0.5, 0, 0]}\n"
         "    - {name: room, shape: {kind: occupancy_map, file: room.yaml, height: 1.5}, rpy: [0, 0, 0.3]}\n"
+        "    - {name: slope, shape: {kind: elevation_map, file: slope.npz}, xyz: [0, 0, 0.1]}\n"
     )
     run = nmm.Scenario.load(tmp_path / "door.yaml").run()
-    wall, room = run.obstacles
+    wall, room, slope = run.obstacles
+    assert slope.shape.box[1] + slope.placement(0.0)[:3, 3] == pytest.approx([7.8, 8.0, 0.4])
     assert np.allclose(wall.placement(0.0)[:3, 3], [0.5, 0.0, 0.0])
     place = room.placement(0.0)
     assert np.arctan2(place[1, 0], place[0, 0]) == pytest.approx(0.8)

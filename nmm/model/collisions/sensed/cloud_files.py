@@ -50,23 +50,30 @@ def _ply(content: bytes) -> Any:
         raise InputError(what) from None
 
 
-def _npz(content: bytes) -> Any:
+def arrays_of(content: bytes) -> dict[str, Any]:
+    """The arrays of a .npz file by their names, without pickles."""
     try:
         loaded = np.load(io.BytesIO(content), allow_pickle=False)
         if not hasattr(loaded, "files"):
             raise InputError("it is a single array", expected="an archive made by np.savez")
         with loaded as file:
-            names = file.files
-            name = "points" if "points" in names else names[0] if len(names) == 1 else None
-            if name is None:
-                raise InputError(expected="the array points, or a single one", available=names)
-            points = file[name]
+            arrays = {name: file[name] for name in file.files}
     except InputError:
         raise
     except Exception as error:  # zlib's and zipfile's own among them
         raise InputError(f"damaged, or no NPZ ({one_line(str(error))})") from None
-    if points.dtype.kind not in "fiu":
-        raise InputError(where=name, expected="numbers", got=str(points.dtype))
+    for name, array in arrays.items():
+        if array.dtype.kind not in "fiu":
+            raise InputError(where=name, expected="numbers", got=str(array.dtype))
+    return arrays
+
+
+def _npz(content: bytes) -> Any:
+    arrays = arrays_of(content)
+    name = "points" if "points" in arrays else next(iter(arrays)) if len(arrays) == 1 else None
+    if name is None:
+        raise InputError(expected="the array points, or a single one", available=[*arrays])
+    points = arrays[name]
     return points if points.dtype in (np.float32, np.float64) else points.astype(np.float64)
 
 

@@ -15,6 +15,7 @@ from nmm.base.files import read_bytes
 from nmm.base.text_format import one_line
 from nmm.model.collisions.elements.boxes import Elements, surface
 from nmm.model.collisions.obstacle import Obstacle, Placement
+from nmm.model.collisions.sensed.cloud_files import arrays_of
 
 #: No map has more cells, no file more bytes.
 MOST, LONGEST = 200_000_000, 2_000_000_000
@@ -168,6 +169,30 @@ class ElevationMap(Obstacle):
         self.resolution = positive(resolution, f"{where}: resolution")
         self.origin = np.append(vector(origin, (2, 3), f"{where}: origin"), 0.0)[:3]
         super().__init__(self._columns(known, where), placement, name=name)
+
+    @classmethod
+    def load(cls, file: str | Path, name: str = "", placement: Placement | None = None) -> ElevationMap:
+        """Of a .npz file the arrays `heights`, `resolution` and, where there is one, `origin`.
+
+        Raises
+        ------
+        InputError : another kind of file, a damaged one, or one without these arrays
+        """
+        path = Path(file)
+        expect(path.suffix.lower() == ".npz", file, "a .npz file", path.suffix)
+        try:
+            arrays = arrays_of(read_bytes(path, LONGEST))
+            for key in ("heights", "resolution"):
+                if key not in arrays:
+                    raise InputError(expected=f"the array {key}", available=[*arrays])
+            resolution, origin = arrays["resolution"], arrays.get("origin", (0.0, 0.0, 0.0))
+            number = resolution.item() if resolution.size == 1 else resolution
+            return cls(arrays["heights"], number, origin, name or path.stem, placement)
+        except InputError as error:
+            raise error.at(file) from None
+        except OSError as error:
+            what = f"cannot be read: {error.strerror or one_line(str(error))}"
+            raise InputError(what, where=file) from None
 
     def __repr__(self) -> str:
         nx, ny = self.heights.shape
