@@ -3,6 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from places import UR5
 
 import nmm
 from nmm.base.kernels.record_layout import Memory, views
@@ -133,6 +134,29 @@ def test_parallel_faces_have_a_row_at_each_end():
         assert len(own) >= 3
         assert np.ptp(along) > 0.05
         assert np.all(rows.d[own] >= least - 1e-9)
+
+
+def test_rows_at_faces_do_not_depend_on_where_the_scene_is():
+    """A normal along an axis of the world has two components, and a ring of corners has distances, that only
+    rounding tells apart."""
+    robot = nmm.mount("car_base", UR5, at="arm_mount", prefix="ur5_")
+    arm = {"shoulder_pan": -0.2, "shoulder_lift": -1.04, "elbow": 1.21, "wrist_1": -1.61, "wrist_2": 1.24}
+    posture = robot.q({f"ur5_{name}_joint": value for name, value in arm.items()} | {"x": 0.84, "theta": 0.1})
+    rng = np.random.default_rng(0)
+    looked_at = 0
+    for _ in range(20):
+        q = posture + np.concatenate([np.zeros(4), rng.uniform(-0.05, 0.05, 6)])
+        scenes = []
+        for x in (0.0, 5.0, 1e-13, 0.1, -3.7):
+            box = nmm.Obstacle(nmm.Box([0.6, 0.4, 1.0]), [2.2 + x, 0.3, 0.5], name="box")
+            setting = nmm.Collisions(0.03, False, [box]).on(robot)
+            rows, _ = rows_at(setting, 0.0, q + x * np.eye(robot.n)[0])
+            scenes.append(np.array(rows.points[: int(rows.used)]) - x * np.eye(9)[[0, 3]].sum(axis=0))
+        looked_at += len(scenes[0]) > 3
+        for points in scenes[1:]:
+            assert points.shape == scenes[0].shape
+            np.testing.assert_allclose(points, scenes[0], rtol=0.0, atol=1e-6)
+    assert looked_at > 10
 
 
 def test_centres_that_coincide_have_a_direction(planar):

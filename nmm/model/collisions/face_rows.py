@@ -23,6 +23,8 @@ DIRECTIONS = np.array(
 )
 #: At most this many corners of a face are used.
 CORNERS = 16
+#: Lengths, m, that differ by less are taken for the same, so that rounding does not choose between them.
+TIE = 1e-9
 
 
 @compiled
@@ -71,7 +73,7 @@ def facing(
             for k in range(CORNERS):
                 if corners[k, 3] < corners[slot, 3]:
                     slot = k
-            if square <= corners[slot, 3]:
+            if square <= corners[slot, 3] + TIE * TIE:
                 continue
         else:
             count += 1
@@ -88,7 +90,7 @@ def add_faces(scene: PairArrays, places: Array, J: Array, rows: DistanceRows, sl
     e, inverse = scratch((2, 3)), scratch((2, COUNT))
     least = 0
     for k in range(3):
-        if abs(x[6 + k]) < abs(x[6 + least]):
+        if abs(x[6 + k]) < abs(x[6 + least]) - TIE:
             least = k
     e[0, 0], e[0, 1], e[0, 2] = 0.0, 0.0, 0.0
     e[0, least] = 1.0
@@ -115,15 +117,15 @@ def add_faces(scene: PairArrays, places: Array, J: Array, rows: DistanceRows, sl
         corners = first_corners if side == 0 else second_corners
         for a in range(first if side == 0 else second):
             u, v, depth, size = corners[a, 0], corners[a, 1], corners[a, 2], math.sqrt(corners[a, 3])
-            quadrant = (2 if u > 0.0 else 0) + (1 if v > 0.0 else 0)
-            if size <= best[quadrant, 0]:
+            quadrant = (2 if u > -TIE else 0) + (1 if v > -TIE else 0)
+            if size <= best[quadrant, 0] + TIE:
                 continue
             beyond = 1.0
             for k in range(0 if plane else COUNT):
                 beyond = max(beyond, (DIRECTIONS[k, 0] * u + DIRECTIONS[k, 1] * v) * inverse[1 - side, k])
             share = 1.0 / beyond
             away = share * size
-            if away > 2.0 * APART and away > best[quadrant, 0]:
+            if away > 2.0 * APART and away > best[quadrant, 0] + TIE:
                 best[quadrant, 0] = away
                 best[quadrant, 1], best[quadrant, 2] = share * u, share * v
                 best[quadrant, 3] = share * depth if side == 0 else -share * depth
