@@ -204,7 +204,7 @@ def doors(plans: int, seed: int) -> None:
             for k in range(plans):
                 scene = walled_door(np.random.default_rng([seed, k]), width)
                 cloud = scanned(scene.obstacles, np.random.default_rng([seed, k]), count).cloud
-                cloud.shape.cells  # noqa: B018
+                cloud.shape.cells  # noqa: B018  # made now, not while plans are timed
                 both = [planned(scene, among, k) for among in ([cloud], scene.obstacles)]
                 times.append([s if plan else np.nan for plan, s in both])
                 durations.append([plan.duration if plan else np.nan for plan, _ in both])

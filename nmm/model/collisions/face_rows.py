@@ -73,7 +73,7 @@ def facing(
             for k in range(CORNERS):
                 if corners[k, 3] < corners[slot, 3]:
                     slot = k
-            if square <= corners[slot, 3] + TIE * TIE:
+            if math.sqrt(square) <= math.sqrt(corners[slot, 3]) + TIE:
                 continue
         else:
             count += 1

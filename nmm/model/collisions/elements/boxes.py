@@ -92,7 +92,7 @@ class Elements(Shape):
             with _MAKING:  # records have their addresses: a second thread is not to replace them
                 if self._cells is None:
                     made = None
-                    if self.halves is None and np.array_equal(self.corner, self.centres.min(axis=0)):
+                    if self.halves is None and np.array_equal(self.corner, ends(self.centres)[0]):
                         made = cells_of_scan(self.centres, self.cell)[2]
                     if made is None:
                         made = sorted_cells(self.centres, self.halves, self.cell, self.corner, self.inside)

@@ -27,14 +27,20 @@ def points_of_file(file: str | Path) -> Any:
     if reader is None:
         raise InputError(where=file, expected="a .ply, .pcd or .npz file", got=path.suffix)
     try:
-        points = reader(read_bytes(path, LONGEST))
+        points = reader(content_of(path))
     except InputError as error:
         raise error.at(file) from None
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror or one_line(str(error))}", where=file) from None
     if points.ndim != 2 or points.shape[1] != 3 or not len(points):
         raise InputError(where=file, expected="points of three coordinates", got=points)
     return points
+
+
+def content_of(path: Path) -> bytes:
+    """The bytes of a file; `InputError`, without the file's name, where it cannot be read."""
+    try:
+        return read_bytes(path, LONGEST)
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror or one_line(str(error))}") from None
 
 
 def _ply(content: bytes) -> Any:

@@ -11,14 +11,13 @@ from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, Flags, positive, vector
 from nmm.base.errors import InputError, expect
-from nmm.base.files import read_bytes
 from nmm.base.text_format import one_line
 from nmm.model.collisions.elements.boxes import Elements, surface
 from nmm.model.collisions.obstacle import Obstacle, Placement
-from nmm.model.collisions.sensed.cloud_files import arrays_of
+from nmm.model.collisions.sensed.cloud_files import arrays_of, content_of
 
-#: No map has more cells, no file more bytes.
-MOST, LONGEST = 200_000_000, 2_000_000_000
+#: No map has more cells.
+MOST = 200_000_000
 
 
 class VoxelMap(Obstacle):
@@ -94,9 +93,9 @@ def _octree(path: Path) -> tuple[Flags, float, Array]:
     """Occupied cells (nx, ny, nz), resolution and corner of a file, read by Coal, which writes to standard
     error and goes on where one is damaged: its header and its count of nodes are looked at here."""
     try:
-        content = read_bytes(path, LONGEST)
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror or one_line(str(error))}", where=path) from None
+        content = content_of(path)
+    except InputError as error:
+        raise error.at(path) from None
     head, data, _ = content.partition(b"\ndata\n")
     keys = dict(line.split(None, 1) for line in head.decode("ascii", "replace").splitlines() if " " in line)
     try:
@@ -181,7 +180,7 @@ class ElevationMap(Obstacle):
         path = Path(file)
         expect(path.suffix.lower() == ".npz", file, "a .npz file", path.suffix)
         try:
-            arrays = arrays_of(read_bytes(path, LONGEST))
+            arrays = arrays_of(content_of(path))
             for key in ("heights", "resolution"):
                 if key not in arrays:
                     raise InputError(expected=f"the array {key}", available=[*arrays])
@@ -190,9 +189,6 @@ class ElevationMap(Obstacle):
             return cls(arrays["heights"], number, origin, name or path.stem, placement)
         except InputError as error:
             raise error.at(file) from None
-        except OSError as error:
-            what = f"cannot be read: {error.strerror or one_line(str(error))}"
-            raise InputError(what, where=file) from None
 
     def __repr__(self) -> str:
         nx, ny = self.heights.shape
