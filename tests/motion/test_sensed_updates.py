@@ -40,24 +40,24 @@ def driven(cloud: nmm.PointCloud) -> nmm.Controller:
 
 
 def test_distances_are_kept_across_updates_at_10_hz() -> None:
-    """Of the true wall, by Coal, at every sample; nothing waits for the cells, as in a robot's loop."""
+    """Of the true wall, by Coal, at every sample. Nothing waits for the cells, as in a robot's loop, except
+    once in 2 s: these samples follow each other faster than a robot's, and cells may take longer than all."""
     cloud = nmm.PointCloud(scan(0), radius=0.025, name="scan")
     controller = driven(cloud)
     robot = controller.robot
     wall = nmm.Obstacle(nmm.Box([0.02, 4.0, 1.5]), [2.01, 0.0, 0.75], name="true")
     true = nmm.Collisions(0.03, self_collisions=False, obstacles=[wall]).on(robot).queries
     scans = [scan(seed) for seed in range(1, 5)]
-    q, least, shapes = robot.q({"q1": 0.3, "q2": 0.6}), np.inf, {id(cloud.shape)}
+    q, least = robot.q({"q1": 0.3, "q2": 0.6}), np.inf
     held = [cloud.shape]
     for k in range(700):
         if k % 5 == 0:
-            cloud.update(scans[k // 5 % 4])
+            cloud.update(scans[k // 5 % 4], wait=k % 100 == 50)
         q, _ = controller.step(0.02 * k, q, 0.02, "zoh")
         least = min(least, true.nearest(0.0, q)[0])
-        if id(cloud.shape) not in shapes:
-            shapes.add(id(cloud.shape))
+        if cloud.shape is not held[-1]:
             held.append(cloud.shape)
-    assert len(held) > 5
+    assert len(held) > 7
     assert 0.03 - NOISE <= least < 0.1
 
 

@@ -153,6 +153,7 @@ class PointCloud(Obstacle):
         """
         rows = _rows(points, f"obstacle {self.name}: points")
         with _UPDATING:
+            fault, self._fault = self._fault, None
             self._waiting = rows
             if self._worker is None:
                 self._worker = Thread(target=self._make, name=f"nmm {self.name}", daemon=True)
@@ -160,8 +161,8 @@ class PointCloud(Obstacle):
             worker = self._worker
         if wait:
             worker.join()
-        with _UPDATING:
-            fault, self._fault = self._fault, None
+            with _UPDATING:
+                fault, self._fault = fault or self._fault, None
         if fault is not None:
             raise fault
 
