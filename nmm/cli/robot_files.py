@@ -149,6 +149,12 @@ def init(
         "FRAME", "The robot's frame that carries the arm.", show="mount, arm_mount or top"
     ),
     out: Path | None = option("FILE", "Where to write; never over a file.", show="<robot>.yaml"),
+    obstacle: list[Path] | None = option(
+        "FILE",
+        "What was sensed, to keep away from: a cloud (.ply, .pcd, .npz), a map (.yaml) or OctoMap's cells "
+        "(.bt). May be repeated.",
+        show=False,
+    ),
     settings: list[str] | None = ARGUMENT,
     loading: Loading,
 ) -> None:
@@ -164,6 +170,7 @@ def init(
     nmm init my_arm.urdf --out scenarios/first.yaml
     nmm init car_base --arm my_arm.urdf --at arm_mount
     nmm init my_arm.urdf --platform fixed
+    nmm init my_robot.urdf --obstacle scan.pcd --obstacle map.yaml
     """
     from nmm.model.robots.loading.source import source_path
     from nmm.scenario.scaffold import first_scenario
@@ -175,7 +182,8 @@ def init(
             source_path(source, keywords["package_dirs"])  # a wrong name is reported before anything else
     file = usual_file(robot if arm is None else arm) if out is None else out
     _expect_free(file)
-    draft = first_scenario(robot, arm=arm, at=at, file=file, arguments=arguments_of(settings), **keywords)
+    keywords |= {"obstacles": obstacle or [], "arguments": arguments_of(settings)}
+    draft = first_scenario(robot, arm=arm, at=at, file=file, **keywords)
     with written_at(f"--out: {file}"):
         _write_new(file, draft.text)
     for line in draft.chosen:

@@ -115,6 +115,96 @@ def test_an_updated_cloud_is_what_a_new_one_would_be() -> None:
         assert array.dtype == other.dtype
 
 
+def rolling(k: int) -> tuple[Array, list[float]]:
+    """A costmap of 4 x 4 m about a robot that has gone k cells, and its origin: a wall at x = 2, a post."""
+    first = np.array([-1.0 + 0.05 * k, -2.0])
+    cells = np.zeros((80, 80), dtype=np.int8)
+    column = 60 - k
+    cells[:, column] = 100
+    cells[10, 20 + k % 7] = 100
+    return cells, [*first, 0.0]
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.7])
+def test_an_updated_map_is_what_a_new_one_would_be(yaw: float) -> None:
+    robot = nmm.load("unicycle_3r")
+    turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+
+    def placed(k: int) -> tuple[Array, list[float]]:
+        cells, origin = rolling(k)
+        return cells, [*turn @ origin[:2], yaw]
+
+    costmap = nmm.OccupancyMap(*_map(placed(0)), height=1.0, name="costmap")
+    collisions = nmm.Collisions(0.03, obstacles=[costmap], self_collisions=False).on(robot)
+    for k in (3, 11):
+        cells, origin = placed(k)
+        costmap.update(cells, origin, wait=True)
+        fresh = nmm.OccupancyMap(cells, 0.05, origin, height=1.0, name="costmap")
+        new = nmm.Collisions(0.03, obstacles=[fresh], self_collisions=False).on(robot)
+        collisions.queries.renew()
+        for q in np.random.default_rng(k).uniform(-1.0, 1.5, (40, robot.n)):
+            assert collisions.queries.nearest(0.0, q)[0] == pytest.approx(
+                new.queries.nearest(0.0, q)[0], abs=1e-9
+            )
+        assert costmap.cell_of(0.3, 0.4) == fresh.cell_of(0.3, 0.4)
+        assert np.array_equal(costmap.origin, fresh.origin)
+    with pytest.raises(InputError, match="yaw"):
+        costmap.update(cells, [0.0, 0.0, yaw + 0.1])
+    with pytest.raises(InputError, match="cells"):
+        costmap.update(np.full((3, 3), 101))
+
+
+def _map(cells_and_origin: tuple[Array, list[float]]) -> tuple[Array, float, list[float]]:
+    return cells_and_origin[0], 0.05, cells_and_origin[1]
+
+
+def test_cells_and_heights_are_updated_as_made_anew() -> None:
+    rng = np.random.default_rng(2)
+    voxels = nmm.VoxelMap(rng.random((9, 8, 7)) < 0.4, 0.1, name="rack")
+    ground = nmm.ElevationMap(rng.random((9, 8)), 0.1, name="ground")
+    occupied, heights = rng.random((12, 5, 7)) < 0.4, rng.random((7, 11))
+    voxels.update(occupied, [1.0, 2.0, 0.5], wait=True)
+    ground.update(heights, [1.0, 2.0], wait=True)
+    others = nmm.VoxelMap(occupied, 0.1, [1.0, 2.0, 0.5]), nmm.ElevationMap(heights, 0.1, [1.0, 2.0])
+    for updated, fresh in zip((voxels, ground), others, strict=True):
+        ours, theirs = updated.shape, fresh.shape
+        assert isinstance(ours, Elements)
+        assert isinstance(theirs, Elements)
+        for array, other in zip(ours.cells, theirs.cells, strict=True):
+            assert np.array_equal(array, other)
+    with pytest.raises(InputError, match="occupied"):
+        voxels.update(np.zeros((2, 2)))
+    with pytest.raises(InputError, match="heights"):
+        ground.update(np.zeros(3))
+
+
+def test_where_nothing_is_seen_any_more_nothing_is() -> None:
+    """A controller then goes through, and a plan is the one without obstacles; later it is there again."""
+    robot = nmm.load("unicycle_3r")
+    start, goal = {"x": 0.3, "y": -0.9, "q1": 0.5}, {"x": 4.0, "y": 0.6, "theta": 0.0}
+    wall = np.zeros((120, 60), dtype=int)
+    wall[:, 40:42] = 100
+    wall[50:72, 40:42] = 0
+    seen = [
+        (nmm.PointCloud(door(8000, 0), radius=0.03, name="seen"), door(8000, 0), np.zeros((0, 3))),
+        (nmm.OccupancyMap(wall, 0.05, [0.0, -3.0, 0.0], name="seen"), wall, np.zeros((5, 5), dtype=int)),
+        (
+            nmm.VoxelMap(wall.T[:, :, None] > 0, 0.05, [0.0, -3.0, 0.0]),
+            wall.T[:, :, None] > 0,
+            wall[:, :, None] < 0,
+        ),
+    ]
+    free = nmm.plan(robot, start, goal, [])
+    for obstacle, full, nothing in seen:
+        planner = nmm.Planner(robot, [obstacle])
+        through = planner.plan(start, goal)
+        obstacle.update(nothing, wait=True)
+        assert len(getattr(obstacle, "points", [])) == 0
+        assert planner.plan(start, goal).duration == pytest.approx(free.duration, rel=1e-6)
+        obstacle.update(full, wait=True)
+        assert planner.plan(start, goal).duration == pytest.approx(through.duration, rel=1e-6)
+
+
 def test_a_planner_keeps_off_a_cloud_as_it_is_now() -> None:
     robot = nmm.load("unicycle_3r")
     start, goal = {"x": 0.3, "y": -0.9, "q1": 0.5}, {"x": 4.0, "y": 0.6, "theta": 0.0}

@@ -423,3 +423,18 @@ def test_a_circle_from_rest(run_up: float) -> None:
     np.testing.assert_allclose(nmm.evaluate(circle, 7.0, here).value, expected, atol=1e-12)
     if run_up:
         np.testing.assert_array_equal(nmm.evaluate(circle, 0.0, here).value_t, 0.0)
+
+
+def test_what_was_sensed_is_an_obstacle_of_the_scenario(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    wall = rng.uniform([2.0, -2.0, 0.0], [2.0, 2.0, 2.0], (20_000, 3))
+    np.savez(tmp_path / "scan.npz", points=wall[np.abs(wall[:, 1]) > 0.45])
+    files = [tmp_path / "scan.npz"]
+    draft = nmm.first_scenario("unicycle_3r", file=tmp_path / "first.yaml", obstacles=files)
+    assert draft.trajectory.complete
+    assert 0.03 <= draft.trajectory.clearance_between.min() < 0.2
+    assert "file: ./scan.npz" in draft.text
+    with pytest.raises(nmm.InputError, match=r"unknown kind of obstacle's file '\.xyz'"):
+        nmm.first_scenario("unicycle_2r", obstacles=["scan.xyz"])
+    with pytest.raises(nmm.InputError, match=r"obstacle nothing\.npz: no such file"):
+        nmm.first_scenario("unicycle_2r", obstacles=["nothing.npz"])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from nmm.base.errors import InputError, NmmError, RunError, ScenarioError
+from nmm.base.errors import InputError, NmmError, RunError, ScenarioError, expect_known
 from nmm.base.text_format import one_line
 from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.loading.ground import slip_warnings
@@ -20,7 +20,7 @@ from nmm.motion.trajectory import Outcome, Trajectory
 from nmm.scenario import Scenario
 from nmm.scenario.document import document_of
 from nmm.scenario.scaffold.end_effector import Hand, HandsPath, hands, paths
-from nmm.scenario.scaffold.parts import ChosenRobot, chosen_robot
+from nmm.scenario.scaffold.parts import ChosenRobot, chosen_robot, written_path
 from nmm.scenario.scaffold.standing import Standing, tipping
 from nmm.scenario.scaffold.start import Start, start_for
 from nmm.scenario.scaffold.text import text_of
@@ -29,6 +29,8 @@ from nmm.scenario.scaffold.text import text_of
 _TRIES, _HANDS = 18, 3
 #: Of what should not tip the robot, what is tried, if it does.
 _SHARES = (1.0, 0.5, 0.25)
+#: Kept to obstacles, m.
+_DISTANCE = 0.03
 #: A path is followed at its speed when limits leave this share of the task's rate everywhere.
 _UNHURRIED = 0.999
 
@@ -63,6 +65,7 @@ def first_scenario(
     arm: str | Path | None = None,
     at: str | None = None,
     file: str | Path | None = None,
+    obstacles: Sequence[str | Path] = (),
     **loading: Any,
 ) -> Draft:
     """A first scenario for a robot: a frame led along a gentle path from a start that is no singularity.
@@ -73,6 +76,8 @@ def first_scenario(
         unless `platform` says what it stands on
     arm : another, that is mounted on the robot, at its frame `at`
     file : where the text will stand: paths below that folder are relative; the working folder when not given
+    obstacles : files of what the robot keeps 3 cm away from: clouds (.ply, .pcd, .npz), maps (.yaml), cells
+        of OctoMap's (.bt); each where its numbers have it
     loading : platform, lock, axle, package_dirs, srdf, arguments as `nmm.load` takes them; lock and srdf are
         the arm's where there is one
 
@@ -92,6 +97,7 @@ def first_scenario(
     place = usual_file(arm or robot) if file is None else Path(file)
     chosen = chosen_robot(str(robot), place.parent, arm=None if arm is None else str(arm), at=at, **loading)
     candidates, standing = hands(chosen.robot), Standing(chosen.robot)
+    keys_of_obstacles = _obstacles(obstacles, place.parent)
     last: NmmError = InputError("there is no frame that its inputs move")
     best, best_tips = cast(Draft | None, None), False
     tries = 0
@@ -103,7 +109,7 @@ def first_scenario(
             tries += 1
             for share in _SHARES:
                 limits, about = _limits(standing, start, share)
-                keys = {**data, "limits": limits}
+                keys = {**data, "limits": limits, **keys_of_obstacles}
                 draft = _tried(keys, {**words, "limits": about}, chosen, hand, start, place)
                 tips = isinstance(draft, Draft) and standing.is_known and tipping(draft.trajectory.torques())
                 if not tips or standing.margin(start.q) <= 0.0:
@@ -124,6 +130,25 @@ def first_scenario(
 def usual_file(source: str | Path) -> Path:
     stem = re.sub(r"[^\w-]", "_", Path(source).name.split(".", 1)[0])
     return Path(f"{stem or 'scenario'}.yaml")
+
+
+#: Which kind of obstacle a file is, by how its name ends.
+_SEEN = {".ply": "point_cloud", ".pcd": "point_cloud", ".npz": "point_cloud", ".bt": "voxel_map"}
+_SEEN |= {".yaml": "occupancy_map", ".yml": "occupancy_map"}
+
+
+def _obstacles(files: Sequence[str | Path], folder: Path) -> dict[str, Any]:
+    """The key `collisions`, where there are obstacles."""
+    listed = []
+    for file in map(Path, files):
+        expect_known("kind of obstacle's file", file.suffix.lower(), _SEEN, f"obstacle {file}")
+        if not file.is_file():
+            raise InputError("no such file", where=f"obstacle {file}")
+        kind = _SEEN[file.suffix.lower()]
+        name = re.sub(r"[^\w-]", "_", file.stem) or kind
+        listed.append({"name": name, "shape": {"kind": kind, "file": written_path(str(file), folder)}})
+    keys = {"distance": _DISTANCE, "self_collisions": False, "obstacles": listed}
+    return {"collisions": keys} if listed else {}
 
 
 def _scenarios(

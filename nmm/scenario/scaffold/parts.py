@@ -83,16 +83,18 @@ def _mounted(base: Mapping[str, Any], arm: Mapping[str, Any], at: str | None) ->
 
 
 def _part(source: str, folder: Path, keys: Mapping[str, Any]) -> dict[str, Any]:
-    part: dict[str, Any] = {"source": _written(source, folder), **keys}
+    part: dict[str, Any] = {"source": written_path(source, folder), **keys}
     if "srdf" in part:
-        part["srdf"] = _written(str(part["srdf"]), folder)
+        part["srdf"] = written_path(str(part["srdf"]), folder)
     if "package_dirs" in part:
         named = [named_folder(str(entry)) for entry in part["package_dirs"]]
-        part["package_dirs"] = [(f"{name}=" if name else "") + _written(path, folder) for name, path in named]
+        part["package_dirs"] = [
+            (f"{name}=" if name else "") + written_path(path, folder) for name, path in named
+        ]
     return part
 
 
-def _written(file: str, folder: Path) -> str:
+def written_path(file: str, folder: Path) -> str:
     """A path as the scenario has it: relative where the file lies below its folder, else absolute."""
     if file in bundled_robots() or file.startswith(PACKAGE) or not ("/" in file or "." in file):
         return file

@@ -73,6 +73,8 @@ _ABOUT = {
     "objective": "What the motion that is left over is used for. kind: "
     f"{', '.join(OBJECTIVES)} (docs/objectives.md).",
     "resolver": f"How the redundancy is resolved. kind: {', '.join(RESOLVERS)} (docs/resolvers.md).",
+    "collisions": "What the robot keeps away from, by distance, m; self_collisions: true, from itself, too "
+    "(docs/sensed.md, docs/collisions.md).",
     "limits": "What inputs and joints are kept within: what the robot's file says, and what is here "
     "(docs/limits.md).",
 }

@@ -5,22 +5,23 @@ from __future__ import annotations
 import math
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nmm.base.arrays import Flags, counted, positive, vector
+from nmm.base.arrays import Array, Flags, counted, positive, vector
 from nmm.base.errors import expect, expect_known
 from nmm.model.collisions.elements.boxes import Elements
-from nmm.model.collisions.obstacle import Obstacle
 from nmm.model.collisions.sensed.map_files import read_map
+from nmm.model.collisions.sensed.sensed_obstacle import Attributes, SensedObstacle
 
 OCCUPIED, FREE = "occupied", "free"
 #: No map has more cells.
 MOST = 100_000_000
 
 
-class OccupancyMap(Obstacle):
+class OccupancyMap(SensedObstacle):
     """A map of cells as an obstacle: walls as high as is said, where cells are occupied or unknown.
 
     Parameters
@@ -64,19 +65,17 @@ class OccupancyMap(Obstacle):
     ) -> None:
         name = name or "occupancy map"
         where = f"obstacle {name}"
-        rows = np.asarray(cells)
-        right = rows.ndim == 2 and rows.size and rows.dtype.kind in "iu"
-        expect(right, f"{where}: cells", "whole numbers of shape (ny, nx)", rows)
-        within = rows.size <= MOST and int(rows.min()) >= -1 and int(rows.max()) <= 100
-        expect(within, f"{where}: cells", f"at most {MOST} numbers from -1 to 100", rows)
-        self.cells: NDArray[np.int8] = rows.astype(np.int8)
+        self.cells: NDArray[np.int8] = _checked(cells, where)
         self.resolution = positive(resolution, f"{where}: resolution")
         self.origin = vector(origin, 3, f"{where}: origin")
         self.height = positive(height, f"{where}: height")
         expect_known("kind of unknown cells", unknown, (OCCUPIED, FREE), where)
         self.unknown, self.lethal = unknown, counted(lethal, f"{where}: lethal")
         x, y, yaw = self.origin
-        super().__init__(self._walls(where), [x, y, 0.0, 0.0, 0.0, yaw], name=name)
+        full = self.full
+        expect(full.any(), f"{where}: cells", f"an occupied cell (from {self.lethal} on)")
+        self._first, self._corner = self.origin, np.zeros(3)
+        super().__init__(self._walls(full, self._corner), [x, y, 0.0, 0.0, 0.0, yaw], name)
 
     def __repr__(self) -> str:
         ny, nx = self.cells.shape
@@ -86,14 +85,54 @@ class OccupancyMap(Obstacle):
     @property
     def full(self) -> Flags:
         """Which cells (ny, nx) are walls."""
-        walls = self.cells >= self.lethal
-        return walls | (self.cells < 0) if self.unknown == OCCUPIED else walls
+        return self._full(self.cells)
 
-    def _walls(self, where: str) -> Elements:
-        full = self.full.T[:, :, np.newaxis]
-        expect(full.any(), f"{where}: cells", f"an occupied cell (from {self.lethal} on)")
+    def _full(self, cells: NDArray[np.int8]) -> Flags:
+        walls = cells >= self.lethal
+        return walls | (cells < 0) if self.unknown == OCCUPIED else walls
+
+    def _walls(self, full: Flags, corner: Array) -> Elements:
+        """Boxes in those cells (ny, nx); the corner (3,) of the first one in the axes of the placement, m."""
         edge = np.array([self.resolution, self.resolution, self.height])
-        return Elements((np.argwhere(full) + 0.5) * edge, 0.5 * edge, 0.0, edge, np.zeros(3))
+        centres = (np.argwhere(full.T[:, :, np.newaxis]) + 0.5) * edge + corner
+        return Elements(centres, 0.5 * edge, 0.0, edge, corner)
+
+    def update(self, cells: ArrayLike, origin: ArrayLike | None = None, wait: bool = False) -> None:
+        """Set its cells from now on, in the background, as `PointCloud.update` does: of a newer map, as of a
+        costmap that goes along with the robot.
+
+        Parameters
+        ----------
+        cells (ny, nx) : as of the constructor, of any size; all free, where nothing is seen
+        origin : as of the constructor, with the same yaw; as it is when not given
+        wait : whether to return when they are in place
+
+        Raises
+        ------
+        InputError : no such cells or origin
+
+        Examples
+        --------
+        >>> costmap = nmm.OccupancyMap([[0, 100], [0, 0]], 0.5, name="costmap")
+        >>> costmap.update([[0, 0, 0], [100, 0, 0]], origin=[2.0, 1.0, 0.0], wait=True)
+        >>> costmap
+        OccupancyMap(costmap, 3 x 2 cells of 0.5 m, height=2)
+        """
+        where = f"obstacle {self.name}"
+        seen = _checked(cells, where)
+        first = self.origin if origin is None else vector(origin, 3, f"{where}: origin")
+        yaw = self.origin[2]
+        turned = math.remainder(first[2] - yaw, 2.0 * math.pi)
+        expect(abs(turned) < 1e-9, f"{where}: origin", f"the yaw of the map, {yaw:g} rad", first[2])
+        self._renew(wait, self._made, seen, first)
+
+    def _made(self, cells: NDArray[np.int8], origin: Array) -> Attributes:
+        """What these cells (ny, nx) set."""
+        full, (x, y, _) = self._full(cells), origin - self._first
+        cosine, sine = math.cos(self._first[2]), math.sin(self._first[2])
+        corner = np.array([cosine * x + sine * y, cosine * y - sine * x, 0.0])
+        shape = self._walls(full, corner) if full.any() else self._away()
+        return {"cells": cells, "origin": origin, "shape": shape, "_corner": corner}
 
     @classmethod
     def load(
@@ -144,6 +183,16 @@ class OccupancyMap(Obstacle):
 
     def cell_of(self, x: float, y: float) -> tuple[int, int]:
         """Row and column of the cell in which a point of the world is, m; they may be outside of the map."""
-        place = self.at(0.0)
-        along, across, _ = place.actInv(np.array([x, y, place.translation[2]])).tolist()
+        pose = self.at(0.0)
+        along, across, _ = (pose.actInv(np.array([x, y, pose.translation[2]])) - self._corner).tolist()
         return math.floor(across / self.resolution), math.floor(along / self.resolution)
+
+
+def _checked(cells: ArrayLike, where: str) -> NDArray[np.int8]:
+    """Cells (ny, nx) of -1 to 100."""
+    rows: NDArray[Any] = np.asarray(cells)
+    right = rows.ndim == 2 and rows.size and rows.dtype.kind in "iu"
+    expect(right, f"{where}: cells", "whole numbers of shape (ny, nx)", rows)
+    within = rows.size <= MOST and int(rows.min()) >= -1 and int(rows.max()) <= 100
+    expect(within, f"{where}: cells", f"at most {MOST} numbers from -1 to 100", rows)
+    return rows.astype(np.int8)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from threading import RLock, Thread
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,10 +11,10 @@ from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, matrix, positive, scalar, vector
 from nmm.base.errors import InputError, expect
-from nmm.base.text_format import one_line
 from nmm.model.collisions.elements.boxes import CELL, Elements
 from nmm.model.collisions.obstacle import Obstacle, Placement
 from nmm.model.collisions.sensed.cloud_files import points_of_file
+from nmm.model.collisions.sensed.sensed_obstacle import Attributes, SensedObstacle
 
 if TYPE_CHECKING:
     from nmm.model.robots.robot import Robot
@@ -24,11 +23,9 @@ if TYPE_CHECKING:
 FARTHEST = 1e6
 #: So many points are looked at for `spacing`.
 LOOKED_AT = 2000
-#: One for all clouds, which are copied and sent to processes.
-_UPDATING = RLock()
 
 
-class PointCloud(Obstacle):
+class PointCloud(SensedObstacle):
     """Points that were seen, as an obstacle: all within `radius` of them.
 
     Distances to it are never more than those to the balls about its points. To the surface that was seen they
@@ -82,29 +79,16 @@ class PointCloud(Obstacle):
         expect(far <= FARTHEST, where, f"coordinates within {FARTHEST:g} m", far)
         radius = scalar(radius, f"obstacle {name}: radius", least=0.0)
         cell = positive(cell, f"obstacle {name}: cell")
-        super().__init__(Elements(rows, None, radius, (cell,) * 3), placement, name=name)
-        self._cell = cell
-        self._waiting: Array | None = None
-        self._worker: Thread | None = None
-        self._fault: InputError | None = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Copies have the points that are in place; what is being made stays here."""
-        return {**vars(self), "_waiting": None, "_worker": None}
+        super().__init__(Elements(rows, None, radius, (cell,) * 3), placement, name)
+        self._cell, self._blank = cell, False
 
     def __repr__(self) -> str:
         return f"PointCloud({self.name}, {len(self.points)} points, radius={self.radius:g})"
 
     @property
-    def _elements(self) -> Elements:
-        """Its points as a shape."""
-        shape: Any = self.shape
-        return shape
-
-    @property
     def points(self) -> Array:
         """The points (N, 3) that are finite, m, in the axes of its placement."""
-        return self._elements.centres
+        return self._elements.centres[:0] if self._blank else self._elements.centres
 
     @property
     def radius(self) -> float:
@@ -136,13 +120,13 @@ class PointCloud(Obstacle):
 
         Parameters
         ----------
-        points (N, 3) : as of the constructor
+        points (N, 3) : as of the constructor; none, where nothing is seen
         wait : whether to return when they are in place
 
         Raises
         ------
-        InputError : no array (N, 3), or, of these points where it waits and else of earlier ones, no finite
-            point
+        InputError : no array (N, 3), or, of these points where it waits and else of earlier ones, none of
+            them finite
 
         Examples
         --------
@@ -151,40 +135,17 @@ class PointCloud(Obstacle):
         >>> cloud
         PointCloud(scan, 1 points, radius=0.01)
         """
-        rows = _rows(points, f"obstacle {self.name}: points")
-        with _UPDATING:
-            fault, self._fault = self._fault, None
-            self._waiting = rows
-            if self._worker is None:
-                self._worker = Thread(target=self._make, name=f"nmm {self.name}", daemon=True)
-                self._worker.start()
-            worker = self._worker
-        if wait:
-            worker.join()
-            with _UPDATING:
-                fault, self._fault = fault or self._fault, None
-        if fault is not None:
-            raise fault
+        self._renew(wait, self._made, _rows(points, f"obstacle {self.name}: points"))
 
-    def _make(self) -> None:
-        """Make cells of the points that wait, until none do."""
-        while True:
-            with _UPDATING:
-                rows, self._waiting = self._waiting, None
-                if rows is None:
-                    self._worker = None
-                    return
-            try:
-                made, far = Elements.of_scan(rows, self.radius, np.full(3, self._cell))
-                if made is None or far > FARTHEST:  # says what is wrong, or takes its time
-                    made = PointCloud(rows, self.radius, self.name, cell=self._cell)._elements
-                    _ = made.cells, made.box  # before anybody asks for them
-            except Exception as error:  # told by the next call: nothing else sees this thread
-                fault = error if isinstance(error, InputError) else InputError(one_line(str(error)))
-                with _UPDATING:
-                    self._fault = fault
-                continue
-            self.shape, self.left_out = made, len(rows) - len(made.centres)
+    def _made(self, rows: Array) -> Attributes:
+        """What these points (N, 3) set."""
+        blank = len(rows) == 0
+        if blank:
+            return {"shape": self._away(), "left_out": 0, "_blank": blank}
+        made, far = Elements.of_scan(rows, self.radius, np.full(3, self._cell))
+        if made is None or far > FARTHEST:  # says what is wrong, or takes its time
+            made = PointCloud(rows, self.radius, self.name, cell=self._cell)._elements
+        return {"shape": made, "left_out": len(rows) - len(made.centres), "_blank": blank}
 
     def transformed(self, T: ArrayLike) -> PointCloud:
         """The cloud with its points in other axes.

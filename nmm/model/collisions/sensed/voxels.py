@@ -13,14 +13,15 @@ from nmm.base.arrays import Array, Flags, positive, vector
 from nmm.base.errors import InputError, expect
 from nmm.base.text_format import one_line
 from nmm.model.collisions.elements.boxes import Elements, surface
-from nmm.model.collisions.obstacle import Obstacle, Placement
+from nmm.model.collisions.obstacle import Placement
 from nmm.model.collisions.sensed.cloud_files import arrays_of, content_of
+from nmm.model.collisions.sensed.sensed_obstacle import Attributes, SensedObstacle
 
 #: No map has more cells.
 MOST = 200_000_000
 
 
-class VoxelMap(Obstacle):
+class VoxelMap(SensedObstacle):
     """Cubes of a grid that are occupied, as an obstacle.
 
     Parameters
@@ -52,18 +53,37 @@ class VoxelMap(Obstacle):
     ) -> None:
         name = name or "voxel map"
         where = f"obstacle {name}"
-        full = np.asarray(occupied)
-        shaped = full.ndim == 3 and full.dtype == bool and full.size <= MOST
-        expect(shaped, f"{where}: occupied", f"truth values (nx, ny, nz), at most {MOST}", full)
-        expect(full.any(), f"{where}: occupied", "an occupied cell")
+        self.occupied = _cubes(occupied, where)
+        expect(self.occupied.any(), f"{where}: occupied", "an occupied cell")
         self.resolution = positive(resolution, f"{where}: resolution")
         self.origin = vector(origin, 3, f"{where}: origin")
-        self.occupied = full
-        super().__init__(solid(full, self.resolution, self.origin), placement, name=name)
+        super().__init__(solid(self.occupied, self.resolution, self.origin), placement, name)
 
     def __repr__(self) -> str:
         count = np.count_nonzero(self.occupied)
         return f"VoxelMap({self.name}, {count} cells of {self.resolution:g} m)"
+
+    def update(self, occupied: ArrayLike, origin: ArrayLike | None = None, wait: bool = False) -> None:
+        """Set its cells from now on, in the background, as `PointCloud.update` does.
+
+        Parameters
+        ----------
+        occupied (nx, ny, nz) : as of the constructor, of any size; none, where nothing is seen
+        origin (3,) : as of the constructor; as it is when not given
+        wait : whether to return when they are in place
+
+        Raises
+        ------
+        InputError : no such array or origin
+        """
+        where = f"obstacle {self.name}"
+        first = self.origin if origin is None else vector(origin, 3, f"{where}: origin")
+        self._renew(wait, self._made, _cubes(occupied, where), first)
+
+    def _made(self, occupied: Flags, origin: Array) -> Attributes:
+        """What these cells (nx, ny, nz) set."""
+        shape = solid(occupied, self.resolution, origin) if occupied.any() else self._away()
+        return {"occupied": occupied, "origin": origin, "shape": shape}
 
     @classmethod
     def load(cls, file: str | Path, name: str = "", placement: Placement | None = None) -> VoxelMap:
@@ -80,6 +100,14 @@ class VoxelMap(Obstacle):
         expect(path.suffix.lower() == ".bt", file, "a .bt file of OctoMap's", path.suffix)
         full, resolution, origin = _octree(path)
         return cls(full, resolution, origin, name or path.stem, placement)
+
+
+def _cubes(occupied: ArrayLike, where: str) -> Flags:
+    """Cells (nx, ny, nz) that are occupied or not."""
+    full = np.asarray(occupied)
+    shaped = full.ndim == 3 and full.dtype == bool and full.size <= MOST
+    expect(shaped, f"{where}: occupied", f"truth values (nx, ny, nz), at most {MOST}", full)
+    return full
 
 
 def solid(full: Flags, resolution: float, origin: Array) -> Elements:
@@ -125,7 +153,7 @@ def _octree(path: Path) -> tuple[Flags, float, Array]:
     return full, resolution, first * resolution
 
 
-class ElevationMap(Obstacle):
+class ElevationMap(SensedObstacle):
     """Heights of the ground as an obstacle: all below them, down to a cell below the lowest.
 
     Parameters
@@ -158,16 +186,11 @@ class ElevationMap(Obstacle):
     ) -> None:
         name = name or "elevation map"
         where = f"obstacle {name}"
-        try:
-            self.heights = np.asarray(heights, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise InputError(where=f"{where}: heights", expected="numbers (nx, ny), m", got=heights) from None
-        expect(self.heights.ndim == 2, f"{where}: heights", "numbers (nx, ny), m", self.heights)
-        known = np.isfinite(self.heights)
-        expect(known.any(), f"{where}: heights", "a finite height", self.heights)
+        self.heights = _heights(heights, where)
+        expect(np.isfinite(self.heights).any(), f"{where}: heights", "a finite height", self.heights)
         self.resolution = positive(resolution, f"{where}: resolution")
         self.origin = np.append(vector(origin, (2, 3), f"{where}: origin"), 0.0)[:3]
-        super().__init__(self._columns(known, where), placement, name=name)
+        super().__init__(columns(self.heights, self.resolution, self.origin, where), placement, name)
 
     @classmethod
     def load(cls, file: str | Path, name: str = "", placement: Placement | None = None) -> ElevationMap:
@@ -194,25 +217,62 @@ class ElevationMap(Obstacle):
         nx, ny = self.heights.shape
         return f"ElevationMap({self.name}, {nx} x {ny} cells of {self.resolution:g} m)"
 
-    def _columns(self, known: Flags, where: str) -> Elements:
-        """Of each column the cells that have no full one beside them; the topmost is as high as it is."""
-        edge = self.resolution
-        heights = np.where(known, self.heights, np.nan)
-        low = float(np.nanmin(heights)) - edge
-        tops = np.where(known, np.ceil((heights - low) / edge - 1e-9), 0).astype(np.int64)
-        expect(float(tops.max()) * tops.size <= MOST, f"{where}: heights", f"at most {MOST} cells")
-        padded = np.pad(tops, 1)
-        beside = np.minimum.reduce([padded[2:, 1:-1], padded[:-2, 1:-1], padded[1:-1, 2:], padded[1:-1, :-2]])
-        level = np.arange(int(tops.max()))
-        full = level < tops[:, :, np.newaxis]
-        # A cell as high as the lowest neighbour's topmost, which may be lower than its cell, is seen.
-        outer = full & ((level >= np.minimum(beside, tops)[:, :, np.newaxis] - 1) | (level == 0))
-        corner = np.append(self.origin[:2], self.origin[2] + low)
-        index = np.argwhere(outer)
-        centres, halves = corner + (index + 0.5) * edge, np.full((len(index), 3), 0.5 * edge)
-        topmost = index[:, 2] == tops[index[:, 0], index[:, 1]] - 1
-        x, y, z = index[topmost].T
-        thick = np.maximum(heights[x, y] - low - z * edge, 1e-6)
-        centres[topmost, 2], halves[topmost, 2] = corner[2] + z * edge + 0.5 * thick, 0.5 * thick
-        inside = corner + (np.argwhere(full & ~outer) + 0.5) * edge
-        return Elements(centres, halves, 0.0, (edge,) * 3, corner, inside)
+    def update(self, heights: ArrayLike, origin: ArrayLike | None = None, wait: bool = False) -> None:
+        """Set its heights from now on, in the background, as `PointCloud.update` does.
+
+        Parameters
+        ----------
+        heights (nx, ny) : as of the constructor, of any size; NaN alone, where nothing is known
+        origin (2,) or (3,) : as of the constructor; as it is when not given
+        wait : whether to return when they are in place
+
+        Raises
+        ------
+        InputError : no such array or origin
+        """
+        where = f"obstacle {self.name}"
+        first = self.origin
+        if origin is not None:
+            first = np.append(vector(origin, (2, 3), f"{where}: origin"), 0.0)[:3]
+        self._renew(wait, self._made, _heights(heights, where), first)
+
+    def _made(self, heights: Array, origin: Array) -> Attributes:
+        """What these heights (nx, ny) set."""
+        known = np.isfinite(heights).any()
+        where = f"obstacle {self.name}"
+        shape = columns(heights, self.resolution, origin, where) if known else self._away()
+        return {"heights": heights, "origin": origin, "shape": shape}
+
+
+def _heights(heights: ArrayLike, where: str) -> Array:
+    """Heights (nx, ny), m."""
+    try:
+        rows = np.asarray(heights, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(where=f"{where}: heights", expected="numbers (nx, ny), m", got=heights) from None
+    expect(rows.ndim == 2 and rows.size, f"{where}: heights", "numbers (nx, ny), m", rows)
+    return rows
+
+
+def columns(heights: Array, resolution: float, origin: Array, where: str) -> Elements:
+    """Of each column of the ground the cells beside which one is free; the topmost is as high as it is."""
+    edge, known = resolution, np.isfinite(heights)
+    heights = np.where(known, heights, np.nan)
+    low = float(np.nanmin(heights)) - edge
+    tops = np.where(known, np.ceil((heights - low) / edge - 1e-9), 0).astype(np.int64)
+    expect(float(tops.max()) * tops.size <= MOST, f"{where}: heights", f"at most {MOST} cells")
+    padded = np.pad(tops, 1)
+    beside = np.minimum.reduce([padded[2:, 1:-1], padded[:-2, 1:-1], padded[1:-1, 2:], padded[1:-1, :-2]])
+    level = np.arange(int(tops.max()))
+    full = level < tops[:, :, np.newaxis]
+    # A cell as high as the lowest neighbour's topmost, which may be lower than its cell, is seen.
+    outer = full & ((level >= np.minimum(beside, tops)[:, :, np.newaxis] - 1) | (level == 0))
+    corner = np.append(origin[:2], origin[2] + low)
+    index = np.argwhere(outer)
+    centres, halves = corner + (index + 0.5) * edge, np.full((len(index), 3), 0.5 * edge)
+    topmost = index[:, 2] == tops[index[:, 0], index[:, 1]] - 1
+    x, y, z = index[topmost].T
+    thick = np.maximum(heights[x, y] - low - z * edge, 1e-6)
+    centres[topmost, 2], halves[topmost, 2] = corner[2] + z * edge + 0.5 * thick, 0.5 * thick
+    inside = corner + (np.argwhere(full & ~outer) + 0.5) * edge
+    return Elements(centres, halves, 0.0, (edge,) * 3, corner, inside)
