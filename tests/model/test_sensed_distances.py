@@ -42,9 +42,11 @@ def measured(blocks: Blocks, places: Array, reach: float, result: Array) -> None
 
 
 @compiled
-def bounded(blocks: Blocks, places: Array, enough: float, least: float, direction: Array) -> float:
+def bounded(
+    blocks: Blocks, places: Array, enough: float, least: float, stop: float, direction: Array
+) -> float:
     shapes = views(SensedShapes, blocks.integers, blocks.floats, 0)
-    return float(sensed_bound(shapes, places, 0, 1, enough, least, direction))
+    return float(sensed_bound(shapes, places, 0, 1, enough, least, stop, direction))
 
 
 _FLAT, _ROWS = float64[::1], float64[:, ::1]
@@ -59,7 +61,7 @@ class Pair:
         memory.add(sensed_shapes([geometry, None], [obstacle.shape], 1))
         self.blocks = memory.blocks()
         self._measured = checked_by_caller(measured, void(BLOCKS, _ROWS, float64, _FLAT))
-        self._bounded = checked_by_caller(bounded, float64(BLOCKS, _ROWS, float64, float64, _FLAT))
+        self._bounded = checked_by_caller(bounded, float64(BLOCKS, _ROWS, float64, float64, float64, _FLAT))
 
     def places(self, pose: pin.SE3) -> Array:
         return np.array([as_row(pose), as_row(self.obstacle.at(0.0))])
@@ -69,9 +71,15 @@ class Pair:
         self._measured(self.blocks, self.places(pose), reach, result)
         return result
 
-    def bound(self, pose: pin.SE3, enough: float, least: float) -> tuple[float, Array]:
+    def bound(self, pose: pin.SE3, enough: float, least: float, stop: float = -np.inf) -> tuple[float, Array]:
         direction = np.zeros(3)
-        return float(self._bounded(self.blocks, self.places(pose), enough, least, direction)), direction
+        places = self.places(pose)
+        return float(self._bounded(self.blocks, places, enough, least, stop, direction)), direction
+
+    def stops_where_it_is_near(self, pose: pin.SE3, bound: float) -> bool:
+        """Whether a search that stops below 0.03 m says the same as one that goes on to this bound."""
+        stopped, _ = self.bound(pose, 0.2, 0.03, 0.03)
+        return stopped == bound if bound >= 0.03 else bound <= stopped < 0.03
 
 
 def room(count: int, rng: np.random.Generator) -> Array:
@@ -162,6 +170,7 @@ def test_a_shapes_distance_to_a_cloud_is_coals_to_its_nearest_point(name: str, p
         exact = min([0.4, *(apart(geometry, at, coal.Sphere(1e-9), point) + 1e-9 for point in near)]) - 0.01
         result = pair.measure(at, 0.39)
         bound, direction = pair.bound(at, 0.2, 0.03)
+        assert pair.stops_where_it_is_near(at, bound)
         if exact >= 0.39:
             assert result[0] >= 0.39 - 1e-6
             continue
@@ -215,6 +224,7 @@ def test_a_shapes_distance_to_voxels_columns_and_heights_is_coals_to_the_boxes(n
             exact = min([9.0, *(apart(geometry, at, box, middle, place.rotation) for box, middle in near)])
             result = pair.measure(at, 0.4)
             bound, _ = pair.bound(at, 0.2, 0.03)
+            assert pair.stops_where_it_is_near(at, bound)
             if exact <= 0.0:
                 assert result[0] <= 0.0
                 assert bound <= 0.0

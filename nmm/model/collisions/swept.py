@@ -179,14 +179,17 @@ def renew(blocks: Blocks, way_blocks: Blocks, results: Array, places: Array, pai
 
 @compiled
 def gap(scene: PairArrays, way: SweptMotion, pair: int, ends: Array, enough: float = math.inf) -> float:
-    """A lower bound of a pair's distance, m, rough above `enough`; ends (2, 12): where its shapes are."""
+    """A lower bound of a pair's distance, m, rough above `enough`; ends (2, 12): where its shapes are. Of
+    what was sensed and is nearer than `enough`, any number that is less."""
     best = -math.inf
     row = scene.sensed.row[scene.pairs[pair, 1]]
     if row >= 0:
         pose, nearest = scratch(12), scratch(6)
         into_axes(ends, 1, 0, pose)
-        least = enough if math.isfinite(enough) else 0.0
-        return float(placed_sensed(scene.sensed, row, pose, scene.pairs[pair, 0], enough, least, nearest))
+        least, stop, shape = 0.0, -math.inf, scene.pairs[pair, 0]
+        if math.isfinite(enough):
+            least = stop = enough
+        return float(placed_sensed(scene.sensed, row, pose, shape, enough, least, stop, nearest))
     for side in range(2):
         other = scene.pairs[pair, 1 - side]
         x = way.planes[pair, side]

@@ -10,9 +10,9 @@ import math
 
 from nmm.base.arrays import Array
 from nmm.base.kernels.compiled import compiled, scratch
-from nmm.base.kernels.pointers import doubles_at, short_integers_at, singles_at
-from nmm.model.collisions.elements.element_distance import box_distance, point_distance
-from nmm.model.collisions.elements.shapes_record import HULL, SensedShapes
+from nmm.base.kernels.pointers import singles_at
+from nmm.model.collisions.elements.near_level import near_distance
+from nmm.model.collisions.elements.shapes_record import SensedShapes
 
 #: Elements are looked for so much farther than the larger of the field's bound and the distance asked for, m.
 REACH = 0.12
@@ -21,8 +21,6 @@ REACH = 0.12
 NEAR = 0.06
 #: How near to the distance from a hull a bound is, as a share of it: of looks, and of rows.
 ROUGH, FINE = 0.01, 1e-9
-#: Shapes' boxes are larger by this, m, against rounding.
-WIDER = 1e-9
 
 
 @compiled
@@ -112,81 +110,15 @@ def is_inside(shapes: SensedShapes, row: int, pose: Array, shape: int) -> bool:
 
 
 @compiled
-def near_distance(
-    shapes: SensedShapes, row: int, pose: Array, shape: int, reach: float, close: float, out: Array
-) -> float:
-    """The near level: the least distance of a shape, placed at pose (12,), to the elements, or `reach` where
-    there is none within it; of hulls and of boxes a lower bound within the share `close` of it.
-
-    out (6,) : the direction from the shape to the nearest element, and the nearest point of it without its
-    radius, in the elements' axes; unchanged where there is none within reach
-    """
-    ny, nz, N = shapes.grids[row, 5], shapes.grids[row, 6], shapes.grids[row, 7]
-    lattice, box = shapes.lattice[row], shapes.boxes[shape]
-    starts = short_integers_at(shapes.grids[row, 1], shapes.grids[row, 4] * ny * nz + 1)
-    centres = doubles_at(shapes.grids[row, 2], 3 * N)
-    own = shapes.grids[row, 3] != 0
-    solid = own or lattice[7] > 0.0
-    halves = doubles_at(shapes.grids[row, 3] if own else shapes.grids[row, 2], 3 * N)
-    simple = not solid and shapes.kind[shape] != HULL
-    best = reach + lattice[6]
-    at, half, now = scratch(3), scratch(3), scratch(6)
-    first, last = scratch(3), scratch(3)
-    for k in range(3):
-        middle, wide = pose[9 + k], WIDER + best
-        for a in range(3):
-            middle += pose[3 * a + k] * box[a]
-            wide += abs(pose[3 * a + k]) * box[3 + a]
-        n = shapes.grids[row, 4 + k]
-        first[k] = max(math.floor((middle - wide - lattice[k]) / lattice[3 + k]), 0.0)
-        last[k] = min(math.floor((middle + wide - lattice[k]) / lattice[3 + k]), n - 1.0)
-        if first[k] > last[k]:
-            return reach
-        half[k] = 0.0
-        now[k] = 0.0
-    low, high = int(first[2]), int(last[2])
-    for i in range(int(first[0]), int(last[0]) + 1):
-        for j in range(int(first[1]), int(last[1]) + 1):
-            column = (i * ny + j) * nz
-            for e in range(starts[column + low], starts[column + high + 1]):
-                square = 0.0
-                for a in range(3):
-                    at[a] = 0.0
-                    wide = 0.0
-                    for k in range(3):
-                        at[a] += pose[3 * a + k] * (centres[3 * e + k] - pose[9 + k])
-                        if solid:
-                            wide += abs(pose[3 * a + k]) * (halves[3 * e + k] if own else lattice[7 + k])
-                    off = abs(at[a] - box[a]) - box[3 + a] - wide
-                    if off > 0.0:
-                        square += off * off
-                if square >= best * best if best > 0.0 else square > 0.0:
-                    continue
-                if simple:
-                    d = point_distance(shapes, shape, at, now)
-                    for k in range(3):
-                        now[3 + k] = at[k]
-                else:
-                    near = best < reach + lattice[6]
-                    for k in range(3):
-                        if solid:
-                            half[k] = halves[3 * e + k] if own else lattice[7 + k]
-                        x, y, z = pose[3 * k], pose[3 * k + 1], pose[3 * k + 2]
-                        now[k] = x * out[0] + y * out[1] + z * out[2] if near else 0.0
-                    d = box_distance(shapes, shape, pose, at, half, best, close, now)
-                if d < best:
-                    best = d
-                    for k in range(3):
-                        x, y, z = pose[k], pose[3 + k], pose[6 + k]
-                        out[k] = x * now[0] + y * now[1] + z * now[2]
-                        out[3 + k] = pose[9 + k] + x * now[3] + y * now[4] + z * now[5]
-    # The sum's rounding is not undone by taking the radius off.
-    return best - lattice[6] if best < reach + lattice[6] else reach
-
-
-@compiled
 def placed_sensed(
-    shapes: SensedShapes, row: int, pose: Array, i: int, enough: float, least: float, out: Array
+    shapes: SensedShapes,
+    row: int,
+    pose: Array,
+    i: int,
+    enough: float,
+    least: float,
+    stop: float,
+    out: Array,
 ) -> float:
     """`sensed_bound` of a shape placed at pose (12,) in the axes of a row's elements; out (6,) as of
     `near_distance`."""
@@ -195,16 +127,24 @@ def placed_sensed(
         return bound
     if is_inside(shapes, row, pose, i):
         return -shapes.lattice[row, 3]
-    d = near_distance(shapes, row, pose, i, min(enough, max(bound, least) + REACH), ROUGH, out)
+    d = near_distance(shapes, row, pose, i, min(enough, max(bound, least) + REACH), stop, ROUGH, out)
     return max(d, bound) if d > 0.0 else d
 
 
 @compiled
 def sensed_bound(
-    shapes: SensedShapes, places: Array, i: int, j: int, enough: float, least: float, direction: Array
+    shapes: SensedShapes,
+    places: Array,
+    i: int,
+    j: int,
+    enough: float,
+    least: float,
+    stop: float,
+    direction: Array,
 ) -> float:
     """A lower bound of the distance of a robot's shape i to a sensed obstacle j, rough above `enough`; no
-    less than it by more than `ROUGH` of it where it is below `least` and `NEAR`. places (G, 12).
+    less than it by more than `ROUGH` of it where it is below `least` and `NEAR`, and any number below `stop`
+    where the distance is. places (G, 12).
 
     direction (3,) : from the nearest element to the shape, world axes; unchanged where none is near
     """
@@ -212,7 +152,7 @@ def sensed_bound(
     into_axes(places, j, i, pose)
     for k in range(6):
         out[k] = 0.0
-    bound = placed_sensed(shapes, shapes.row[j], pose, i, enough, least, out)
+    bound = placed_sensed(shapes, shapes.row[j], pose, i, enough, least, stop, out)
     if out[0] * out[0] + out[1] * out[1] + out[2] * out[2] > 0.5:
         for k in range(3):
             direction[k] = -(places[j, k] * out[0] + places[j, 3 + k] * out[1] + places[j, 6 + k] * out[2])
@@ -234,7 +174,7 @@ def measure_sensed(shapes: SensedShapes, places: Array, i: int, j: int, reach: f
         if is_inside(shapes, row, pose, i):
             d = -shapes.lattice[row, 3]
         else:
-            d = near_distance(shapes, row, pose, i, reach, FINE, out)
+            d = near_distance(shapes, row, pose, i, reach, -math.inf, FINE, out)
             d = max(d, bound) if d > 0.0 else d
     radius = shapes.lattice[row, 6]
     square = out[0] * out[0] + out[1] * out[1] + out[2] * out[2]

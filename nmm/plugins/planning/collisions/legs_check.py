@@ -99,7 +99,8 @@ def place_shape(scene: MovedShapes, joints: Array, shape: int) -> None:
 @compiled
 def placed_bound(scene: MovedShapes, pair: int, enough: float, least: float) -> float:
     """A lower bound of the distance of a pair where its shapes were placed; rough above `enough`, and above
-    `least` as `separation` is. Where that is nan, the direction is asked for: it follows a pair from farther
+    `least` as `separation` is; of what was sensed and is too near, any number that is less than `least` and
+    MARGIN. Where that is nan, the direction is asked for: it follows a pair from farther
     away."""
     shapes, places, centres = scene.shapes, scene.places, scene.centres
     i, j = shapes.pairs[pair, 0], shapes.pairs[pair, 1]
@@ -120,8 +121,10 @@ def placed_bound(scene: MovedShapes, pair: int, enough: float, least: float) -> 
         if apart >= enough:
             return apart
     if scene.sensed.row[j] >= 0:
-        exact = enough if math.isnan(least) else least + MARGIN
-        return sensed_bound(scene.sensed, places, i, j, enough, exact, shapes.between[pair])
+        exact, stop = enough, -math.inf
+        if not math.isnan(least):
+            exact = stop = least + MARGIN
+        return sensed_bound(scene.sensed, places, i, j, enough, exact, stop, shapes.between[pair])
     return separation(shapes, places, pair, enough, least)
 
 
