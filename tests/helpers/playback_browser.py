@@ -15,6 +15,7 @@ import pinocchio as pin
 import pytest
 from playback_robot import hand_built_robot
 from playwright.sync_api import Browser, Page, ViewportSize, sync_playwright
+from ports import MOST
 
 from nmm.model.robots.robot import Robot
 from nmm.views.playback import Motion, write_html
@@ -72,9 +73,22 @@ def _launched(config: pytest.Config) -> Browser:
     options += ["--webgl-antialiasing-mode=none"]  # four samples a pixel would double what a picture takes
     playwright = sync_playwright().start()
     launched = playwright.chromium.launch(executable_path=path, args=options)
+    for name in ("new_page", "new_context"):
+        setattr(launched, name, _patient(getattr(launched, name)))
     config.add_cleanup(playwright.stop)
     config.add_cleanup(launched.close)  # before it
     return launched
+
+
+def _patient(makes: Callable[..., Any]) -> Callable[..., Any]:
+    """What it makes waits longer than 30 s: on a busy machine one picture of a page may take seconds."""
+
+    def made(**options: Any) -> Any:
+        waits = makes(**options)
+        waits.set_default_timeout(2000.0 * MOST)
+        return waits
+
+    return made
 
 
 @pytest.fixture(scope="module")
