@@ -199,7 +199,7 @@ def test_threads_and_controllers_used_again_change_no_cell(short: Path) -> None:
 
 
 def test_an_interrupt_in_a_thread_ends_all(short: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    definition = nmm.Sweep(short, {"q0.x": (-1, 1)}, samples=40).definition
+    definition = nmm.Sweep(short, {"q0.x": (-1, 1)}, samples=400).definition
     begun: list[int] = []
     rollout = sweep_rows._rollout
 
@@ -211,8 +211,8 @@ def test_an_interrupt_in_a_thread_ends_all(short: Path, monkeypatch: pytest.Monk
 
     monkeypatch.setattr(sweep_rows, "_rollout", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        rows_of(definition, range(40), threads=2)
-    assert len(begun) < 40
+        rows_of(definition, range(400), threads=2)
+    assert len(begun) < 400
 
 
 # The folder
