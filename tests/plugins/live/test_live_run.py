@@ -26,7 +26,8 @@ from nmm.views.playback import LiveRun
 
 DT = 0.005
 SHORT = ("--set", "duration=0.5")
-LONG = ("--set", "duration=5000")
+#: Not over before it is interrupted: no compiled loop computes it.
+LONG = ("--set", "duration=5000", "--set", "method=adaptive")
 
 
 def scenario(name: str = "unicycle_3r_position", **settings: object) -> nmm.Scenario:
