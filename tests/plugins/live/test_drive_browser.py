@@ -187,6 +187,9 @@ def test_the_ball_stays_under_the_pointer_while_the_robot_drives(
         arrived(page)
         assert page.evaluate("nmm.camera.following")
         x, y = page.evaluate(WHERE, [0, "", 0.0])
+        place = """() => new MeshCat.THREE.Vector3()
+          .setFromMatrixPosition(nmm.node(nmm.motions[0].root).matrixWorld).project(viewer.camera).toArray()"""
+        robot = page.evaluate(place)
         root = "nmm.node(nmm.motions[0].root).matrixWorld.elements.slice(12, 15)"
         began, before = np.array(page.evaluate(root)), target(page)
         page.mouse.move(x, y)
@@ -205,13 +208,10 @@ def test_the_ball_stays_under_the_pointer_while_the_robot_drives(
         assert max(apart) < 2.0, apart
         assert np.linalg.norm(target(page) - before) < 3.0
         # Let go of, the camera catches up: the robot is where it was in the picture.
-        place = """() => new MeshCat.THREE.Vector3()
-          .setFromMatrixPosition(nmm.node(nmm.motions[0].root).matrixWorld).project(viewer.camera).toArray()"""
-        away = page.evaluate(place)
+        assert np.hypot(*np.subtract(page.evaluate(place), robot)[:2]) > 0.05
         page.mouse.up()
-        page.wait_for_timeout(1000.0)
-        back = page.evaluate(place)
-        assert np.hypot(*back[:2]) < np.hypot(*away[:2])
+        back = f"([x, y]) => {{ const at = ({place})(); return Math.hypot(at[0] - x, at[1] - y) < 0.02; }}"
+        page.wait_for_function(back, arg=robot[:2], timeout=1000.0 * MOST)
 
 
 #: Where points of a target's ring are in the window, px: `at` rad about its axis from the next axis on, and
