@@ -216,7 +216,8 @@ class Clock:
         elif behind > 1.0 / FPS:
             late = int(behind * FPS)
             self.late += late
-            self._due += late / FPS  # the rest of a picture's time is not forgotten
+            # The rest of a picture's time is not forgotten, except where time is skipped.
+            self._due = self._due + late / FPS if behind <= LATE else self._now
         self._due += 1.0 / FPS
         return woken.wait(max(0.0, self._due - time.monotonic()))
 

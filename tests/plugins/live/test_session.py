@@ -81,6 +81,18 @@ def test_time_beyond_what_is_late_is_let_go_and_counted(seconds: Seconds) -> Non
     assert clock.passed() == 0.0
 
 
+def test_after_time_that_is_let_go_pictures_begin_anew(seconds: Seconds) -> None:
+    """The next one is a whole picture's time later, as the clock itself goes on by one."""
+    clock = Clock()
+    clock.passed()
+    clock.rest(seconds)
+    seconds.now += LATE + 0.75 / FPS
+    shown, late = clock.passed(), clock.late
+    clock.rest(seconds)
+    assert clock.passed() == pytest.approx(1.0 / FPS) == shown
+    assert clock.late - late == int((LATE + 0.75 / FPS) * FPS)
+
+
 def test_messages_have_a_known_type_and_exactly_its_keys() -> None:
     assert message('{"type":"aim","task":0,"value":[1]}', KINDS) == {"type": "aim", "task": 0, "value": [1]}
     assert message(b'{"type":"go"}', KINDS) == {"type": "go"}
