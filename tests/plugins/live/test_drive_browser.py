@@ -211,7 +211,7 @@ def test_the_ball_stays_under_the_pointer_while_the_robot_drives(
         assert np.hypot(*np.subtract(page.evaluate(place), robot)[:2]) > 0.05
         page.mouse.up()
         back = f"([x, y]) => {{ const at = ({place})(); return Math.hypot(at[0] - x, at[1] - y) < 0.02; }}"
-        page.wait_for_function(back, arg=robot[:2], timeout=1000.0 * MOST)
+        page.wait_for_function(back, arg=robot[:2])
 
 
 #: Where points of a target's ring are in the window, px: `at` rad about its axis from the next axis on, and
