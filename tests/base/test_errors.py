@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from findings import refused
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import nmm
@@ -113,7 +113,13 @@ NAMES = st.text(max_size=3000) | st.builds(lambda one, n: one * n, st.text(max_s
 ERRORS = st.sampled_from([InputError, RobotError, ScenarioError, RunError])
 
 
-@settings(deadline=None, max_examples=50)
+@settings(  # the same cases each time, as long as they take: for the gate
+    max_examples=50,
+    deadline=None,
+    derandomize=True,
+    database=None,
+    suppress_health_check=[HealthCheck.too_slow],
+)
 @given(ERRORS, NAMES, NAMES, NAMES, NAMES | st.floats() | st.none(), st.none() | st.lists(NAMES, max_size=40))
 def test_messages_are_one_line_of_at_most_300_characters(
     kind: type[NmmError], what: str, where: str, expected: str, got: object, available: list[str] | None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import random
+import re
 import signal
 import struct
 import subprocess
@@ -101,6 +102,14 @@ def test_the_end_of_a_file_is_no_interrupt(
     assert capsys.readouterr().err.strip() == "nmm play: what was read ended too early"
 
 
+def catches(pid: int, number: signal.Signals) -> bool:
+    """Whether a process has a handler for a signal, as the kernel says."""
+    status = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
+    caught = re.search(r"^SigCgt:\s*([0-9a-f]+)$", status, re.MULTILINE)
+    assert caught is not None
+    return bool(int(caught[1], 16) >> (number - 1) & 1)
+
+
 def test_ending_while_figures_are_drawn_or_imported(tmp_path: Path) -> None:
     """SIGTERM at instants of a map, with its imports and figures: one line, no leftovers."""
     rng = random.Random(14)
@@ -108,7 +117,10 @@ def test_ending_while_figures_are_drawn_or_imported(tmp_path: Path) -> None:
         running = process(
             tmp_path, "map", "unicycle_2r", "--task", "position", "--samples", "20", "--out", "o"
         )
-        time.sleep(rng.uniform(1.0, 3.0))
+        while not catches(running.pid, signal.SIGTERM):  # from then on it is nmm that ends, not Python
+            assert running.poll() is None, running.communicate()
+            time.sleep(0.005)
+        time.sleep(rng.uniform(0.0, 2.0))
         running.send_signal(signal.SIGTERM)
         out, err = running.communicate(timeout=MOST)
         if running.returncode == 130:

@@ -59,7 +59,8 @@ BEYOND = {
 def test_beyond_a_bound_a_file_is_refused_by_its_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, what: str
 ) -> None:
-    monkeypatch.setattr(budget, "PATIENCE", 0.5)
+    if what == "xacro":  # another bound is met however long xacro takes until then
+        monkeypatch.setattr(budget, "PATIENCE", 0.5)
     file = tmp_path / "robot.xacro"
     file.write_text(f"{HEAD}{text}</robot>", encoding="utf-8")
     began = time.process_time()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import pickle
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -275,6 +276,8 @@ def test_meshes_are_read_once_and_kept(read: list[str], tmp_path: Path) -> None:
 def test_a_mesh_that_was_written_anew_is_read_anew(tmp_path: Path) -> None:
     for size in (1.0, 3.0):
         cube(tmp_path / "part.stl", size)
+        # Files are as long, and may be written within one tick of the file system's clock.
+        os.utime(tmp_path / "part.stl", (size, size))
         loaded = nmm.load(meshed(tmp_path, "part.stl"))
         (part,) = loaded.collision_model.geometryObjects
         part.geometry.computeLocalAABB()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pickle
 import threading
+from collections.abc import Callable
+from time import perf_counter
 
 import numpy as np
 import pytest
@@ -226,29 +228,43 @@ def test_a_planner_keeps_off_a_cloud_as_it_is_now() -> None:
     assert np.abs(q[np.abs(q[:, 0] - 2.0) < 0.05][:, 1]).max() < 0.45
 
 
-def test_other_threads_run_while_a_field_is_made() -> None:
-    """A call that holds Python's lock would let this thread count to nothing."""
-    shape = (200, 200, 100)
-    field = np.full(shape, np.float32(np.inf))
-    field[::20, ::20, ::20] = 0.0
-    counts, cell, work = np.array(shape, dtype=np.int64), np.full(3, 0.05), np.empty((4, 201))
-    small = field[:1].copy()  # compiled or read before it counts
-    transform(address_of(small), np.array(small.shape, dtype=np.int64), cell, work, 1.0)
-    going, done = threading.Event(), threading.Event()
+def standing(call: Callable[[], object]) -> float:
+    """How long this thread stands at once while another calls something, as a share of the call's time."""
+    began, ended, seen = [], [], [perf_counter()]
 
     def make() -> None:
-        going.set()
-        transform(address_of(field), counts, cell, work, 1.0)
-        done.set()
+        began.append(perf_counter())
+        call()
+        ended.append(perf_counter())
 
     thread = threading.Thread(target=make)
     thread.start()
-    going.wait()
-    count = 0
-    while not done.is_set():
-        count += 1
+    while not ended:
+        now = perf_counter()
+        if now > seen[-1] + 1e-4:
+            seen.append(now)
     thread.join()
-    assert count > 1000
+    (first,), (last,) = began, ended
+    during = [now for now in seen if first < now < last]
+    return float(np.diff([first, *during, last]).max() / (last - first))
+
+
+def test_other_threads_run_while_a_field_is_made() -> None:
+    """A call that holds Python's lock, as a sum of integers does, lets this thread stand to its end."""
+    shape = (200, 200, 100)
+    counts, cell, work = np.array(shape, dtype=np.int64), np.full(3, 0.05), np.empty((4, 201))
+    field = np.empty(shape, dtype=np.float32)
+
+    def make() -> None:
+        transform(address_of(field), counts, cell, work, 1.0)
+
+    shares = []
+    while len(shares) < 6 and min(shares[1:], default=1.0) > 0.5:  # a busy machine may let it stand, too
+        field[:] = np.inf
+        field[::20, ::20, ::20] = 0.0
+        shares.append(standing(make))  # the first may compile or read what is compiled
+    assert min(shares[1:]) <= 0.5
+    assert max(standing(lambda: sum(range(10_000_000))) for _ in range(2)) > 0.5
 
 
 def test_a_horizon_looks_at_a_map_that_turns_where_it_will_be() -> None:

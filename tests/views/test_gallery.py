@@ -7,6 +7,7 @@ import json
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import gallery
@@ -14,6 +15,7 @@ import made_from
 import pytest
 from gallery import Card, Gallery, make_card, render, write_gallery
 from page_links import Links
+from ports import MOST
 
 import nmm
 from nmm.base.bundled import bundled_scenarios
@@ -169,6 +171,7 @@ def test_ctrl_c_leaves_nothing(tmp_path: Path) -> None:
     running = subprocess.Popen([sys.executable, script, "--folder", "gallery"], cwd=tmp_path)
     while not list(tmp_path.glob(".gallery*/*/viewer.js")):
         assert running.poll() is None
+        time.sleep(0.02)
     running.send_signal(signal.SIGINT)
-    assert running.wait(20.0) == -signal.SIGINT
+    assert running.wait(MOST) == -signal.SIGINT
     assert list(tmp_path.iterdir()) == []

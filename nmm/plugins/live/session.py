@@ -211,9 +211,13 @@ class Clock:
         """Wait until the next picture is due, or `woken` is set, and tell which; while time stands nothing is
         late."""
         behind = self._now - self._due
-        if stands or behind < 0.0 or behind > 1.0 / FPS:
-            self.late += 0 if stands else max(0, int(behind * FPS))
+        if stands or behind < 0.0:
             self._due = self._now
+        elif behind > 1.0 / FPS:
+            late = int(behind * FPS)
+            self.late += late
+            # The rest of a picture's time is not forgotten, except where time is skipped.
+            self._due = self._due + late / FPS if behind <= LATE else self._now
         self._due += 1.0 / FPS
         return woken.wait(max(0.0, self._due - time.monotonic()))
 

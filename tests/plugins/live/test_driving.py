@@ -9,7 +9,8 @@ import time
 import urllib.error
 import urllib.request
 from base64 import b64decode
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -492,6 +493,26 @@ def test_a_page_is_told_every_sample_once_and_one_that_comes_late_the_last_ones(
     assert late is not None
     told = [sample[0] for sample in late["samples"]]
     assert told[: len(times)] == times[: len(told)]
+
+
+class Growing(deque[tuple[int, list[float]]]):
+    """Samples, to which the loop adds one after each time that somebody goes through them."""
+
+    def __iter__(self) -> Iterator[tuple[int, list[float]]]:
+        held = [self[k] for k in range(len(self))]
+        number, (t, *values) = held[-1]
+        self.append((number + 1, [t + 0.1, *values]))
+        return iter(held)
+
+
+def test_a_sample_that_comes_while_a_picture_is_made_is_told_with_the_next() -> None:
+    with Loop(scenario()) as loop:
+        wait_for(lambda: loop.picture()["t"] > 0.1)
+    session, latest = loop.session, loop.session.follow()  # its own loop has ended
+    session._samples = Growing(session._samples)
+    before = [sample[0] for _, sample in tuple(session._samples)]
+    times = [sample[0] for _ in range(4) for sample in json.loads(latest().splitlines()[-1])["samples"]]
+    np.testing.assert_allclose(times, [*before, *(before[-1] + 0.1 * np.arange(1, 5))], rtol=1e-12)
 
 
 def test_pause_restart_and_choices_are_told() -> None:

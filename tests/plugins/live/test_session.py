@@ -59,6 +59,18 @@ def test_a_late_picture_counts_those_that_were_due_meanwhile(seconds: Seconds) -
     assert clock.late == int((0.2 - 1.0 / FPS) * FPS)
 
 
+def test_pictures_made_and_late_are_all_that_were_due(seconds: Seconds) -> None:
+    """Whatever each takes: no part of a picture's time is lost from one to the next."""
+    clock, began = Clock(), seconds.now
+    taken = [*np.random.default_rng(5).uniform(0.0, 0.2, 200), *np.zeros(10)]  # in time again at the end
+    for each in taken:
+        clock.passed()
+        seconds.now += each
+        clock.rest(seconds)
+    assert len(taken) + clock.late == pytest.approx((seconds.now - began) * FPS, abs=1e-6)
+    assert clock.late > 200
+
+
 def test_time_beyond_what_is_late_is_let_go_and_counted(seconds: Seconds) -> None:
     clock = Clock()
     seconds.now += LATE + 0.75
@@ -67,6 +79,18 @@ def test_time_beyond_what_is_late_is_let_go_and_counted(seconds: Seconds) -> Non
     seconds.now += 5.0
     clock.stand()
     assert clock.passed() == 0.0
+
+
+def test_after_time_that_is_let_go_pictures_begin_anew(seconds: Seconds) -> None:
+    """The next one is a whole picture's time later, as the clock itself goes on by one."""
+    clock = Clock()
+    clock.passed()
+    clock.rest(seconds)
+    seconds.now += LATE + 0.75 / FPS
+    shown, late = clock.passed(), clock.late
+    clock.rest(seconds)
+    assert clock.passed() == pytest.approx(1.0 / FPS) == shown
+    assert clock.late - late == int((LATE + 0.75 / FPS) * FPS)
 
 
 def test_messages_have_a_known_type_and_exactly_its_keys() -> None:

@@ -108,7 +108,7 @@ def test_a_pose_that_is_walled_in_is_told_with_what_was_tried(train):
     ring = [box((3.0, -3.0, 0.0), (3.2, 3.0, 1.0)), box((8.0, -3.0, 0.0), (8.2, 3.0, 1.0))]
     ring += [box((3.0, 2.8, 0.0), (8.2, 3.0, 1.0)), box((3.0, -3.0, 0.0), (8.2, -2.8, 1.0))]
     with pytest.raises(nmm.RunError, match=r"[1-9]\d* configurations and 0 rough"):
-        nmm.plan(train, train.rest, {"x": 6.0, "y": 0.0, "theta": 0.0}, ring, seconds=0.2)
+        nmm.plan(train, train.rest, {"x": 6.0, "y": 0.0, "theta": 0.0}, ring, seconds=1.0)
 
 
 def test_what_waits_and_what_goes_on_is_refused(train):

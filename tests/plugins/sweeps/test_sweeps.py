@@ -6,8 +6,9 @@ import itertools
 import json
 import re
 import shutil
+import signal
+import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,9 +16,10 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from command_line import Result, process
+from command_line import Result
 from findings import refused
 from places import ROOT
+from ports import MOST
 from short_scenario import MINIMAL
 
 import nmm
@@ -199,7 +201,7 @@ def test_threads_and_controllers_used_again_change_no_cell(short: Path) -> None:
 
 
 def test_an_interrupt_in_a_thread_ends_all(short: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    definition = nmm.Sweep(short, {"q0.x": (-1, 1)}, samples=40).definition
+    definition = nmm.Sweep(short, {"q0.x": (-1, 1)}, samples=400).definition
     begun: list[int] = []
     rollout = sweep_rows._rollout
 
@@ -211,8 +213,8 @@ def test_an_interrupt_in_a_thread_ends_all(short: Path, monkeypatch: pytest.Monk
 
     monkeypatch.setattr(sweep_rows, "_rollout", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        rows_of(definition, range(40), threads=2)
-    assert len(begun) < 40
+        rows_of(definition, range(400), threads=2)
+    assert len(begun) < 400
 
 
 # The folder
@@ -303,6 +305,22 @@ def test_interrupted_anywhere_it_goes_on_to_the_same_bytes(
     assert bytes_of[0] == bytes_of[1]
 
 
+#: A command line that is killed while it writes the third part.
+KILLED = """
+import os, signal
+import pyarrow.parquet
+from nmm.cli.exit_status import main
+write, files = pyarrow.parquet.write_table, []
+def write_and_end(table, file):
+    write(table, file)
+    files.append(file)
+    if len(files) == 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+pyarrow.parquet.write_table = write_and_end
+main()
+"""
+
+
 @pytest.mark.parametrize(
     "other",
     [pytest.param("resolver.kind=rg,pg", marks=pytest.mark.thorough), "robot.arguments.d=0.2,0.4"],
@@ -310,18 +328,15 @@ def test_interrupted_anywhere_it_goes_on_to_the_same_bytes(
 def test_killed_and_started_again_nothing_is_lost_or_doubled(short: Path, tmp_path: Path, other: str) -> None:
     """Two threads, or processes where robots change; killed as by the system; then on to the end."""
     vary = ["--vary", "q0.x=-1:1", "--vary", other, "--samples", "40", "--set", "duration=0.4"]
-    began = process(tmp_path, "sweep", str(short), *vary, "--out", "out", "--jobs", "2")
-    while len(list((tmp_path / "out").glob("parts/*.parquet"))) < 2:
-        assert began.poll() is None, began.communicate()
-        time.sleep(0.01)
-    began.kill()
-    began.communicate()
-    assert 2 <= len(list((tmp_path / "out").glob("parts/*.parquet"))) < 10
+    command = [sys.executable, "-c", KILLED, "sweep", str(short), *vary, "--out", "out", "--jobs", "2"]
+    killed = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=5 * MOST)
+    assert killed.returncode == -signal.SIGKILL, killed.stderr
+    assert len(list((tmp_path / "out").glob("parts/*.parquet"))) == 2
     key, values = other.split("=")
     sweep = nmm.Sweep(short, {"q0.x": (-1, 1), key: values}, samples=40, settings={"duration": 0.4})
     shares: list[float] = []
     table = sweep.run(tmp_path / "out", jobs=1, progress=shares.append).table
-    assert shares[0] >= 0.2
+    assert shares[0] == pytest.approx(0.2)
     assert table["index"].to_pylist() == list(range(80))
     assert table.take([0, 33, 79]).to_pylist() == rows_of(sweep.definition, [0, 33, 79])
 

@@ -231,8 +231,9 @@ class DriveSession(RobotSession):
                 plan, line = self._plan
                 lines.append(line)
             placed, picture = self._picture
-            fresh = [sample for count, sample in tuple(self._samples) if count > seen]
-            seen = self._samples[-1][0] if self._samples else seen
+            samples = tuple(self._samples)  # looked at once: the loop may add one at any time
+            fresh = [sample for count, sample in samples if count > seen]
+            seen = samples[-1][0] if samples else seen
             return "\n".join([*lines, *placed, encode({**picture, "samples": fresh})])
 
         return latest
