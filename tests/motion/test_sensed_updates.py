@@ -181,12 +181,12 @@ def test_cells_and_heights_are_updated_as_made_anew() -> None:
 
 
 def test_where_nothing_is_seen_any_more_nothing_is() -> None:
-    """A controller then goes through, and a plan is the one without obstacles; later it is there again."""
+    """A plan is then the one without obstacles, also where axes are tilted; later it is there again."""
     robot = nmm.load("unicycle_3r")
     start, goal = {"x": 0.3, "y": -0.9, "q1": 0.5}, {"x": 4.0, "y": 0.6, "theta": 0.0}
     wall = np.zeros((120, 60), dtype=int)
     wall[:, 40:42] = 100
-    wall[50:72, 40:42] = 0
+    wall[64:86, 40:42] = 0
     seen = [
         (nmm.PointCloud(door(8000, 0), radius=0.03, name="seen"), door(8000, 0), np.zeros((0, 3))),
         (nmm.OccupancyMap(wall, 0.05, [0.0, -3.0, 0.0], name="seen"), wall, np.zeros((5, 5), dtype=int)),
@@ -196,15 +196,36 @@ def test_where_nothing_is_seen_any_more_nothing_is() -> None:
             wall[:, :, None] < 0,
         ),
     ]
+    tilted = np.array(
+        [[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+    )
+    points = door(8000, 0) @ tilted[:3, :3]
+    seen.append((nmm.PointCloud(points, 0.03, "seen", tilted), points, np.zeros((0, 3))))
+    heights = np.where(wall.T > 0, 1.0, -0.2)
+    seen.append((nmm.ElevationMap(heights, 0.05, [0.0, -3.0]), heights, np.full((3, 4), np.nan)))
     free = nmm.plan(robot, start, goal, [])
     for obstacle, full, nothing in seen:
         planner = nmm.Planner(robot, [obstacle])
         through = planner.plan(start, goal)
+        assert through.duration > 1.01 * free.duration
         obstacle.update(nothing, wait=True)
+        empty = obstacle.shape
+        obstacle.update(nothing, wait=True)
+        assert obstacle.shape is empty
         assert len(getattr(obstacle, "points", [])) == 0
         assert planner.plan(start, goal).duration == pytest.approx(free.duration, rel=1e-6)
         obstacle.update(full, wait=True)
         assert planner.plan(start, goal).duration == pytest.approx(through.duration, rel=1e-6)
+
+
+def test_a_map_stays_where_it_was_asked_for_last() -> None:
+    """Also where the cells that came with that origin were left out for newer ones."""
+    costmap = nmm.OccupancyMap(np.full((40, 40), 100), 0.05)
+    for k in range(20):
+        costmap.update(np.full((40, 40), 100), [0.1 * k, 0.0, 0.0])
+    costmap.update(np.full((2, 2), 100), wait=True)
+    assert costmap.origin[0] == pytest.approx(1.9)
+    assert costmap.cell_of(1.91, 0.01) == (0, 0)
 
 
 def test_a_planner_keeps_off_a_cloud_as_it_is_now() -> None:

@@ -11,6 +11,7 @@ import pytest
 import yaml
 from command_line import Result
 from findings import refused
+from PIL import Image
 from places import DATA
 from small_pictures import draw_only
 from urdf_parts import joint, link, robot, shape, write
@@ -429,11 +430,21 @@ def test_what_was_sensed_is_an_obstacle_of_the_scenario(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     wall = rng.uniform([2.0, -2.0, 0.0], [2.0, 2.0, 2.0], (20_000, 3))
     np.savez(tmp_path / "scan.npz", points=wall[np.abs(wall[:, 1]) > 0.45])
-    files = [tmp_path / "scan.npz"]
+    cells = np.full((80, 10), 254, dtype=np.uint8)
+    cells[:30] = cells[50:] = 0
+    Image.fromarray(cells).save(tmp_path / "scan.png")
+    keys = "image: scan.png, resolution: 0.05, origin: [2, -2, 0], negate: 0, free_thresh: 0.2"
+    write(tmp_path / "scan.yaml", "{" + keys + ", occupied_thresh: 0.65}")
+    files = [tmp_path / "scan.npz", tmp_path / "scan.yaml"]
     draft = nmm.first_scenario("unicycle_3r", file=tmp_path / "first.yaml", obstacles=files)
     assert draft.trajectory.complete
     assert 0.03 <= draft.trajectory.clearance_between.min() < 0.2
     assert "file: ./scan.npz" in draft.text
+    assert "file: ./scan.yaml" in draft.text
+    names = " ".join(draft.trajectory.clearance_names)
+    assert "and scan 2" in names or "scan 2 and" in names
+    with pytest.raises(nmm.InputError, match="a list of files"):
+        nmm.first_scenario("unicycle_2r", obstacles="scan.npz")
     with pytest.raises(nmm.InputError, match=r"unknown kind of obstacle's file '\.xyz'"):
         nmm.first_scenario("unicycle_2r", obstacles=["scan.xyz"])
     with pytest.raises(nmm.InputError, match=r"obstacle nothing\.npz: no such file"):

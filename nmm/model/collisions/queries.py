@@ -119,7 +119,7 @@ class Queries:
         self._rows = checked_by_caller(write_rows, _ROWS)
 
     def renew(self) -> None:
-        """Take the clouds that have been updated as they are now; between two samples."""
+        """Take what was sensed and has been updated as it is now; between two samples."""
         scene = self.scene
         for k, (i, obstacle) in enumerate(self.moving):
             shape = obstacle.shape

@@ -102,7 +102,7 @@ class Prepared:
         return other
 
     def _know(self, asked: Asked, forms: list[Shape], scene: Scene | None) -> None:
-        """forms : the obstacles' shapes, read before the scene was made: clouds may be updated meanwhile."""
+        """forms : the obstacles' shapes, read before the scene was made: some may be updated meanwhile."""
         self.asked, self._forms, self.scene = asked, forms, scene
         self._places = [obstacle.at(0.0) for obstacle in asked.collisions.obstacles]
 

@@ -31,6 +31,12 @@ _TRIES, _HANDS = 18, 3
 _SHARES = (1.0, 0.5, 0.25)
 #: Kept to obstacles, m.
 _DISTANCE = 0.03
+#: Which kind of obstacle a file is, by how its name ends.
+_SEEN = {
+    **dict.fromkeys((".ply", ".pcd", ".npz"), "point_cloud"),
+    **dict.fromkeys((".yaml", ".yml"), "occupancy_map"),
+    ".bt": "voxel_map",
+}
 #: A path is followed at its speed when limits leave this share of the task's rate everywhere.
 _UNHURRIED = 0.999
 
@@ -95,9 +101,9 @@ def first_scenario(
         if not isinstance(value, str | Path):
             raise InputError(expected="a robot's name or path", got=value)
     place = usual_file(arm or robot) if file is None else Path(file)
+    keys_of_obstacles = _obstacles(obstacles, place.parent)
     chosen = chosen_robot(str(robot), place.parent, arm=None if arm is None else str(arm), at=at, **loading)
     candidates, standing = hands(chosen.robot), Standing(chosen.robot)
-    keys_of_obstacles = _obstacles(obstacles, place.parent)
     last: NmmError = InputError("there is no frame that its inputs move")
     best, best_tips = cast(Draft | None, None), False
     tries = 0
@@ -132,20 +138,19 @@ def usual_file(source: str | Path) -> Path:
     return Path(f"{stem or 'scenario'}.yaml")
 
 
-#: Which kind of obstacle a file is, by how its name ends.
-_SEEN = {".ply": "point_cloud", ".pcd": "point_cloud", ".npz": "point_cloud", ".bt": "voxel_map"}
-_SEEN |= {".yaml": "occupancy_map", ".yml": "occupancy_map"}
-
-
 def _obstacles(files: Sequence[str | Path], folder: Path) -> dict[str, Any]:
     """The key `collisions`, where there are obstacles."""
-    listed = []
+    if isinstance(files, str | Path):
+        raise InputError(where="obstacles", expected="a list of files", got=files)
+    listed: list[dict[str, Any]] = []
     for file in map(Path, files):
         expect_known("kind of obstacle's file", file.suffix.lower(), _SEEN, f"obstacle {file}")
         if not file.is_file():
             raise InputError("no such file", where=f"obstacle {file}")
         kind = _SEEN[file.suffix.lower()]
         name = re.sub(r"[^\w-]", "_", file.stem) or kind
+        same = sum(entry["name"].partition(" ")[0] == name for entry in listed)
+        name += f" {same + 1}" if same else ""
         listed.append({"name": name, "shape": {"kind": kind, "file": written_path(str(file), folder)}})
     keys = {"distance": _DISTANCE, "self_collisions": False, "obstacles": listed}
     return {"collisions": keys} if listed else {}

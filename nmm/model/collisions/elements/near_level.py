@@ -1,6 +1,6 @@
 """The near level of distances to what was sensed, compiled: of a robot's shape to the elements of the cells
 around it. Columns of cells and elements whose boxes are farther than the nearest so far are passed over; of
-hulls also elements beyond a plane that separated an earlier one."""
+hulls, and beside boxes of any shape, also elements beyond a plane that separated an earlier one."""
 
 import math
 
@@ -11,7 +11,7 @@ from nmm.base.kernels.pointers import doubles_at, short_integers_at
 from nmm.model.collisions.elements.element_distance import box_distance, point_distance
 from nmm.model.collisions.elements.shapes_record import HULL, SensedShapes
 
-#: So many planes that touch a hull are remembered while it is beside elements.
+#: So many planes that touch a shape are remembered while it is beside elements.
 PLANES = 8
 #: Shapes' boxes are larger by this, m, against rounding.
 WIDER = 1e-9
@@ -19,11 +19,11 @@ WIDER = 1e-9
 
 @compiled
 def is_beyond(planes: Array, pose: Array, at: Array, half: Array, distance: float) -> bool:
-    """Whether one of `planes` says that a hull is so far from a box, its middle at `at` (3,), half (3,) of
+    """Whether one of `planes` says that a shape is so far from a box, its middle at `at` (3,), half (3,) of
     its edges along the axes of pose (12,).
 
     planes (1 + PLANES, 4) : in the first row how many there were; then, in the axes of `at`, normals, and how
-        far the hull reaches along them
+        far the shape reaches along them
     """
     for c in range(1, 1 + min(int(planes[0, 0]), PLANES)):
         beyond = planes[c, 0] * at[0] + planes[c, 1] * at[1] + planes[c, 2] * at[2] - planes[c, 3]
@@ -38,7 +38,7 @@ def is_beyond(planes: Array, pose: Array, at: Array, half: Array, distance: floa
 
 @compiled
 def remember_plane(planes: Array, pose: Array, at: Array, half: Array, n: Array, distance: float) -> None:
-    """Put the plane across n (3,) that touches the hull among `planes`, as of `is_beyond`: the box is
+    """Put the plane across n (3,) that touches the shape among `planes`, as of `is_beyond`: the box is
     `distance` beyond it."""
     c = 1 + int(planes[0, 0]) % PLANES
     planes[0, 0] += 1.0
@@ -127,7 +127,7 @@ def near_distance(
     less than `stop`, any number that is.
 
     out (6,) : the direction from the shape to the nearest element, and the nearest point of it without its
-    radius, in the elements' axes; unchanged where there is none within reach
+    radius, in the elements' axes; 0 where there is none within reach
     """
     lattice, box = shapes.lattice[row], shapes.boxes[shape]
     ny, nz = shapes.grids[row, 5], shapes.grids[row, 6]

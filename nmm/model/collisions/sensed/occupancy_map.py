@@ -37,7 +37,7 @@ class OccupancyMap(SensedObstacle):
 
     Attributes
     ----------
-    cells, resolution, origin, height, unknown, lethal : as they came
+    cells, resolution, origin, height, unknown, lethal : as they came, or came last
 
     Raises
     ------
@@ -74,7 +74,7 @@ class OccupancyMap(SensedObstacle):
         x, y, yaw = self.origin
         full = self.full
         expect(full.any(), f"{where}: cells", f"an occupied cell (from {self.lethal} on)")
-        self._first, self._corner = self.origin, np.zeros(3)
+        self._first, self._last, self._corner = self.origin, self.origin, np.zeros(3)
         super().__init__(self._walls(full, self._corner), [x, y, 0.0, 0.0, 0.0, yaw], name)
 
     def __repr__(self) -> str:
@@ -104,12 +104,12 @@ class OccupancyMap(SensedObstacle):
         Parameters
         ----------
         cells (ny, nx) : as of the constructor, of any size; all free, where nothing is seen
-        origin : as of the constructor, with the same yaw; as it is when not given
+        origin : as of the constructor, with the same yaw; the last one when not given
         wait : whether to return when they are in place
 
         Raises
         ------
-        InputError : no such cells or origin
+        InputError : no such cells or origin; what an earlier update could not make
 
         Examples
         --------
@@ -120,19 +120,20 @@ class OccupancyMap(SensedObstacle):
         """
         where = f"obstacle {self.name}"
         seen = _checked(cells, where)
-        first = self.origin if origin is None else vector(origin, 3, f"{where}: origin")
-        yaw = self.origin[2]
-        turned = math.remainder(first[2] - yaw, 2.0 * math.pi)
-        expect(abs(turned) < 1e-9, f"{where}: origin", f"the yaw of the map, {yaw:g} rad", first[2])
-        self._renew(wait, self._made, seen, first)
+        last = self._last if origin is None else vector(origin, 3, f"{where}: origin")
+        yaw = self._first[2]
+        turned = math.remainder(last[2] - yaw, 2.0 * math.pi)
+        expect(abs(turned) < 1e-9, f"{where}: origin", f"the yaw of the map, {yaw:g} rad", last[2])
+        self._last = last
+        self._renew(wait, self._made, seen, last)
 
     def _made(self, cells: NDArray[np.int8], origin: Array) -> Attributes:
         """What these cells (ny, nx) set."""
         full, (x, y, _) = self._full(cells), origin - self._first
         cosine, sine = math.cos(self._first[2]), math.sin(self._first[2])
         corner = np.array([cosine * x + sine * y, cosine * y - sine * x, 0.0])
-        shape = self._walls(full, corner) if full.any() else self._away()
-        return {"cells": cells, "origin": origin, "shape": shape, "_corner": corner}
+        shape = self._walls(full, corner) if full.any() else None
+        return self._seen(shape, cells=cells, origin=origin, _corner=corner)
 
     @classmethod
     def load(

@@ -80,7 +80,7 @@ class PointCloud(SensedObstacle):
         radius = scalar(radius, f"obstacle {name}: radius", least=0.0)
         cell = positive(cell, f"obstacle {name}: cell")
         super().__init__(Elements(rows, None, radius, (cell,) * 3), placement, name)
-        self._cell, self._blank = cell, False
+        self._cell = cell
 
     def __repr__(self) -> str:
         return f"PointCloud({self.name}, {len(self.points)} points, radius={self.radius:g})"
@@ -120,7 +120,7 @@ class PointCloud(SensedObstacle):
 
         Parameters
         ----------
-        points (N, 3) : as of the constructor; none, where nothing is seen
+        points (N, 3) : as of the constructor; none, where nothing is seen: then `points` are none
         wait : whether to return when they are in place
 
         Raises
@@ -139,13 +139,12 @@ class PointCloud(SensedObstacle):
 
     def _made(self, rows: Array) -> Attributes:
         """What these points (N, 3) set."""
-        blank = len(rows) == 0
-        if blank:
-            return {"shape": self._away(), "left_out": 0, "_blank": blank}
+        if not len(rows):
+            return self._seen(None, left_out=0)
         made, far = Elements.of_scan(rows, self.radius, np.full(3, self._cell))
         if made is None or far > FARTHEST:  # says what is wrong, or takes its time
             made = PointCloud(rows, self.radius, self.name, cell=self._cell)._elements
-        return {"shape": made, "left_out": len(rows) - len(made.centres), "_blank": blank}
+        return self._seen(made, left_out=len(rows) - len(made.centres))
 
     def transformed(self, T: ArrayLike) -> PointCloud:
         """The cloud with its points in other axes.

@@ -7,6 +7,8 @@ from functools import partial
 from threading import RLock, Thread
 from typing import Any, TypeAlias
 
+import numpy as np
+
 from nmm.base.errors import InputError
 from nmm.base.text_format import one_line
 from nmm.model.collisions.elements.boxes import Elements
@@ -14,7 +16,7 @@ from nmm.model.collisions.obstacle import Obstacle, Placement
 
 #: What is set at once: attributes by their names, `shape` among them.
 Attributes: TypeAlias = dict[str, Any]
-#: Where the one element is of what is seen empty, m below the middle of what was seen before.
+#: Where the one element is of what is seen empty, m below the middle of what was seen last.
 AWAY = 1000.0
 #: One for all, which are copied and sent to processes.
 _UPDATING = RLock()
@@ -25,13 +27,14 @@ class SensedObstacle(Obstacle):
 
     def __init__(self, shape: Elements, placement: Placement | None, name: str) -> None:
         super().__init__(shape, placement, name=name)
+        self._blank = False
         self._waiting: Callable[[], Attributes] | None = None
         self._worker: Thread | None = None
         self._fault: InputError | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Copies have what is in place; what is being made stays here."""
-        return {**vars(self), "_waiting": None, "_worker": None}
+        return {**vars(self), "_waiting": None, "_worker": None, "_fault": None}
 
     @property
     def _elements(self) -> Elements:
@@ -52,7 +55,7 @@ class SensedObstacle(Obstacle):
         if wait:
             worker.join()
             with _UPDATING:
-                fault, self._fault = fault or self._fault, None
+                fault, self._fault = self._fault or fault, None
         if fault is not None:
             raise fault
 
@@ -74,8 +77,12 @@ class SensedObstacle(Obstacle):
             else:
                 vars(self).update(made)
 
-    def _away(self) -> Elements:
-        """What is seen empty: a point so far below that nothing is near it."""
-        low, high = self._elements.box
-        middle = 0.5 * (low + high)
-        return Elements([[middle[0], middle[1], low[2] - AWAY]], radius=self._elements.radius)
+    def _seen(self, shape: Elements | None, **attributes: Any) -> Attributes:
+        """What is set with a shape; None where nothing is seen: then a point so far below that nothing is
+        near it."""
+        blank = shape is None
+        if blank and not self._blank:
+            low, high = self._elements.box
+            below = self.at(0.0).rotation.T @ np.array([0.0, 0.0, -AWAY])
+            shape = Elements([0.5 * (low + high) + below], radius=self._elements.radius)
+        return {**attributes, "shape": self._elements if shape is None else shape, "_blank": blank}

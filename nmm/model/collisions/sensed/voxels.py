@@ -56,7 +56,7 @@ class VoxelMap(SensedObstacle):
         self.occupied = _cubes(occupied, where)
         expect(self.occupied.any(), f"{where}: occupied", "an occupied cell")
         self.resolution = positive(resolution, f"{where}: resolution")
-        self.origin = vector(origin, 3, f"{where}: origin")
+        self.origin = self._last = vector(origin, 3, f"{where}: origin")
         super().__init__(solid(self.occupied, self.resolution, self.origin), placement, name)
 
     def __repr__(self) -> str:
@@ -69,21 +69,22 @@ class VoxelMap(SensedObstacle):
         Parameters
         ----------
         occupied (nx, ny, nz) : as of the constructor, of any size; none, where nothing is seen
-        origin (3,) : as of the constructor; as it is when not given
+        origin (3,) : as of the constructor; the last one when not given
         wait : whether to return when they are in place
 
         Raises
         ------
-        InputError : no such array or origin
+        InputError : no such array or origin; what an earlier update could not make
         """
         where = f"obstacle {self.name}"
-        first = self.origin if origin is None else vector(origin, 3, f"{where}: origin")
-        self._renew(wait, self._made, _cubes(occupied, where), first)
+        seen = _cubes(occupied, where)
+        self._last = self._last if origin is None else vector(origin, 3, f"{where}: origin")
+        self._renew(wait, self._made, seen, self._last)
 
     def _made(self, occupied: Flags, origin: Array) -> Attributes:
         """What these cells (nx, ny, nz) set."""
-        shape = solid(occupied, self.resolution, origin) if occupied.any() else self._away()
-        return {"occupied": occupied, "origin": origin, "shape": shape}
+        shape = solid(occupied, self.resolution, origin) if occupied.any() else None
+        return self._seen(shape, occupied=occupied, origin=origin)
 
     @classmethod
     def load(cls, file: str | Path, name: str = "", placement: Placement | None = None) -> VoxelMap:
@@ -104,7 +105,7 @@ class VoxelMap(SensedObstacle):
 
 def _cubes(occupied: ArrayLike, where: str) -> Flags:
     """Cells (nx, ny, nz) that are occupied or not."""
-    full = np.asarray(occupied)
+    full = np.array(occupied)
     shaped = full.ndim == 3 and full.dtype == bool and full.size <= MOST
     expect(shaped, f"{where}: occupied", f"truth values (nx, ny, nz), at most {MOST}", full)
     return full
@@ -189,7 +190,7 @@ class ElevationMap(SensedObstacle):
         self.heights = _heights(heights, where)
         expect(np.isfinite(self.heights).any(), f"{where}: heights", "a finite height", self.heights)
         self.resolution = positive(resolution, f"{where}: resolution")
-        self.origin = np.append(vector(origin, (2, 3), f"{where}: origin"), 0.0)[:3]
+        self.origin = self._last = _corner(origin, where)
         super().__init__(columns(self.heights, self.resolution, self.origin, where), placement, name)
 
     @classmethod
@@ -223,31 +224,34 @@ class ElevationMap(SensedObstacle):
         Parameters
         ----------
         heights (nx, ny) : as of the constructor, of any size; NaN alone, where nothing is known
-        origin (2,) or (3,) : as of the constructor; as it is when not given
+        origin (2,) or (3,) : as of the constructor; the last one when not given
         wait : whether to return when they are in place
 
         Raises
         ------
-        InputError : no such array or origin
+        InputError : no such array or origin; what an earlier update could not make
         """
         where = f"obstacle {self.name}"
-        first = self.origin
-        if origin is not None:
-            first = np.append(vector(origin, (2, 3), f"{where}: origin"), 0.0)[:3]
-        self._renew(wait, self._made, _heights(heights, where), first)
+        seen = _heights(heights, where)
+        self._last = self._last if origin is None else _corner(origin, where)
+        self._renew(wait, self._made, seen, self._last)
 
     def _made(self, heights: Array, origin: Array) -> Attributes:
         """What these heights (nx, ny) set."""
         known = np.isfinite(heights).any()
-        where = f"obstacle {self.name}"
-        shape = columns(heights, self.resolution, origin, where) if known else self._away()
-        return {"heights": heights, "origin": origin, "shape": shape}
+        shape = columns(heights, self.resolution, origin, f"obstacle {self.name}") if known else None
+        return self._seen(shape, heights=heights, origin=origin)
+
+
+def _corner(origin: ArrayLike, where: str) -> Array:
+    """An origin (2,) or (3,) as (3,), m."""
+    return np.append(vector(origin, (2, 3), f"{where}: origin"), 0.0)[:3]
 
 
 def _heights(heights: ArrayLike, where: str) -> Array:
     """Heights (nx, ny), m."""
     try:
-        rows = np.asarray(heights, dtype=np.float64)
+        rows = np.array(heights, dtype=np.float64)
     except (TypeError, ValueError):
         raise InputError(where=f"{where}: heights", expected="numbers (nx, ny), m", got=heights) from None
     expect(rows.ndim == 2 and rows.size, f"{where}: heights", "numbers (nx, ny), m", rows)

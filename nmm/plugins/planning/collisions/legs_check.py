@@ -99,9 +99,8 @@ def place_shape(scene: MovedShapes, joints: Array, shape: int) -> None:
 @compiled
 def placed_bound(scene: MovedShapes, pair: int, enough: float, least: float) -> float:
     """A lower bound of the distance of a pair where its shapes were placed; rough above `enough`, and above
-    `least` as `separation` is; of what was sensed and is too near, any number that is less than `least` and
-    MARGIN. Where that is nan, the direction is asked for: it follows a pair from farther
-    away."""
+    `least` as `separation` is; of what was sensed, any number below the sum of `least` and MARGIN where the
+    distance is. Where `least` is nan, the direction is asked for: it follows a pair from farther away."""
     shapes, places, centres = scene.shapes, scene.places, scene.centres
     i, j = shapes.pairs[pair, 0], shapes.pairs[pair, 1]
     if j < shapes.planes[()]:
