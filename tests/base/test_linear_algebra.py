@@ -13,6 +13,7 @@ from nmm.base.kernels.linear_algebra import (
     orthonormal_rows,
     pseudoinverse_transposed,
     residual_norm,
+    singular_rows,
 )
 
 Array = NDArray[np.float64]
@@ -153,3 +154,22 @@ def test_residual_norm(shape: tuple[int, int], rng: np.random.Generator) -> None
     assert residual == pytest.approx(np.linalg.norm(J @ u - rate), rel=1e-13)
     expected = np.finfo(float).eps * np.linalg.norm(np.abs(J) @ np.abs(u) + np.abs(rate))
     assert rounding == pytest.approx(expected, rel=1e-13)
+
+
+@each_shape
+@pytest.mark.parametrize("condition", [1.0, 1e3, 1e9])
+def test_singular_rows(shape: tuple[int, int], condition: float, rng: np.random.Generator) -> None:
+    """Of rows in either order of their lengths: the rotation that is not the smaller one goes back and forth."""
+    s = shape[0]
+    for _ in range(5):
+        A = with_condition(shape, condition, rng)
+        rows, R = A.copy(), np.full((s, s), np.nan)
+        extremes = singular_rows(rows, R)
+        singular = np.linalg.svd(A, compute_uv=False)
+        np.testing.assert_allclose(
+            np.sort(np.linalg.norm(rows, axis=1))[::-1], singular, rtol=1e-13, atol=1e-15
+        )
+        np.testing.assert_allclose(extremes, (singular[-1], singular[0]), rtol=1e-13, atol=1e-15)
+        np.testing.assert_allclose(R @ R.T, np.eye(s), rtol=0, atol=1e-14)
+        np.testing.assert_allclose(R.T @ rows, A, rtol=0, atol=1e-14)
+        np.testing.assert_allclose(rows @ rows.T, np.diag(np.diag(rows @ rows.T)), rtol=0, atol=1e-14)

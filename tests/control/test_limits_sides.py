@@ -14,6 +14,7 @@ from nmm.base.arrays import Array
 from nmm.base.errors import InputError
 from nmm.base.findings import Finding
 from nmm.base.text_format import apart
+from nmm.control.limits.bounds import approach
 
 DT = 0.01
 SIDES = {"v": [-3.0, 1.0], "omega": 2.0, "arm": [-2.0, 4.0]}
@@ -78,6 +79,19 @@ def test_a_joint_comes_to_its_limit_as_the_side_that_brakes_allows(target: float
     least = u[fastest] ** 2 / (2.0 * braking)
     assert 1.0 - abs(run.q[fastest, 0]) == pytest.approx(least, abs=2.0 * u[fastest] * DT)
     assert np.diff(u).min() >= -braking * DT - 1e-12
+
+
+def test_the_fastest_approach_brakes_exactly_at_its_limit(rng: np.random.Generator) -> None:
+    """The way of a speed that falls by a in each sample, summed up, is the room that there was."""
+    for room, acceleration, dt in rng.uniform([1e-3, 0.1, 1e-3], [1.0, 9.0, 0.1], (100, 3)):
+        u = approach(room, dt, acceleration, 0.1)
+        speeds = np.arange(u, 0.0, -acceleration * dt)
+        assert dt * speeds.sum() == pytest.approx(room, rel=1e-9)
+
+
+def test_beyond_its_limit_a_coordinate_returns_at_its_own_speed_and_no_farther() -> None:
+    assert approach(-0.3, DT, 5.0, 0.2) == -0.2
+    assert approach(-0.001, DT, 5.0, 0.2) == pytest.approx(-0.1)
 
 
 def test_plans_slow_down_harder_than_they_speed_up() -> None:

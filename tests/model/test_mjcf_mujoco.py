@@ -143,8 +143,8 @@ BALL = '<geom size="0.1"/>'
             )
         ),
         world(
-            '<body name="a"><joint name="j" armature="0.2"/>'
-            '<geom type="cylinder" fromto="0 0 0 1 0.5 0" size="0.1"/><body name="b" xyaxes="0 1 0 -1 0 0">'
+            '<body name="a" euler="20 -30 50"><joint name="j" armature="0.2"/>'
+            '<geom type="cylinder" fromto="0 0 0 1 0.5 0" size="0.1"/><body name="b" xyaxes="0 1 0 -1 0.5 0">'
             '<joint name="k" type="slide" axis="0 1 1" ref="0.3" range="-1 1"/>'
             '<inertial pos="0.1 0 0" mass="2" fullinertia="0.2 0.3 0.4 0.01 0.02 0.03"/></body></body>',
             before='<compiler eulerseq="ZYX" autolimits="false"/>'
