@@ -159,7 +159,7 @@ def test_residual_norm(shape: tuple[int, int], rng: np.random.Generator) -> None
 @each_shape
 @pytest.mark.parametrize("condition", [1.0, 1e3, 1e9])
 def test_singular_rows(shape: tuple[int, int], condition: float, rng: np.random.Generator) -> None:
-    """Of rows in either order of their lengths: the rotation that is not the smaller one goes back and forth."""
+    """Rows in either order of their lengths: the larger of the two rotations would go back and forth."""
     s = shape[0]
     for _ in range(5):
         A = with_condition(shape, condition, rng)
