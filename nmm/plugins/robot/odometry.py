@@ -10,18 +10,20 @@ from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, matrix, scalar, vector
 from nmm.base.errors import InputError, expect_known, few, no_such
+from nmm.base.kernels.compiled import checked_by_caller
+from nmm.base.kernels.planar_motions import compose_planar, exp_planar
+from nmm.base.kernels.record_layout import Memory
 from nmm.base.text_format import apart
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.wheel_rates import wheel_rates, wheel_shares
 from nmm.model.robots.zero_order_hold import HeldInputs
+from nmm.plugins.robot.counted_motion import INPUTS, MOTION, Counted, inputs_of_record, motion_of_record
 from nmm.plugins.robot.encoders import Turns
 
-#: Where Gauss and Legendre look between two readings, for two looks.
-NODES = 0.5 - math.sqrt(3.0) / 6.0, 0.5 + math.sqrt(3.0) / 6.0
 #: A counter may run so much faster than the fastest, and jump by that, rad or m: stamps are not exact.
 FASTER, JUMPS = 1.5, 0.1
-#: A turn with a smaller square root of rounding is straight, rad.
-_STRAIGHT = 1e-5
+#: Counters whose rows are less regular may leave inputs undetermined.
+DETERMINED = 1e-9
 
 
 def counted_wheels(robot: Robot) -> list[str]:
@@ -43,54 +45,55 @@ class Counters:
         #: Its own joints whose rates are inputs: by the index of the input.
         self.steered = {int(c): int(i) for i, c in enumerate(robot.rate_coordinates[: platform.p]) if c >= 3}
         self.names = tuple(names)
-        self._wheels = [k for k, wheel in enumerate(wheels) if wheel in names]
-        self._rows = rows[self._wheels]
-        self._inputs = [platform.inputs.index(name) for name in names if name in platform.inputs]
-        order = [wheels[k] for k in self._wheels] + [platform.inputs[i] for i in self._inputs]
+        counted = [*wheels, *platform.inputs]
         for name in names:
-            if name not in order:
-                raise no_such("wheel", name, (*wheels, *platform.inputs), where)
-        self._order = [order.index(name) for name in names]
-        self._matrices: dict[bytes, tuple[Array, Array]] = {}
-        self._inverses: dict[bytes, Array] = {}
+            if name not in counted:
+                raise no_such("wheel", name, counted, where)
+        places = [counted.index(name) for name in names]
+        steered = np.full(platform.p, -1)
+        steered[[*self.steered.values()]] = [*self.steered]
+        #: What the step of odometry reads.
+        self.record = Counted(
+            platform.velocity_map.address,
+            platform.parameters,
+            platform.n_p,
+            rows,
+            np.array([place if place < len(wheels) else len(wheels) - 1 - place for place in places]),
+            steered,
+        )
+        memory = Memory()
+        memory.add(self.record)
+        self.blocks = memory.blocks()
+        self._write_inputs = checked_by_caller(inputs_of_record, INPUTS)
 
     def matrix(self, own: Array) -> tuple[Array, Array]:
         """What inputs (p,) add to the counters (k,) and to the platform's pose in its own axes (3,), with its
         own joints at `own` (n_p - 3,): (k, p), (3, p)."""
-        if (found := self._matrices.get(key := own.tobytes())) is not None:
-            return found
-        robot, p = self.robot, self.robot.platform.p
-        q = np.zeros((1, robot.n))
-        q[0, 3 : robot.platform.n_p] = own
-        G = robot.platform.G(q[0, : robot.platform.n_p])
-        counted = wheel_shares(self._rows, q)[0][:, : robot.platform.n_p] @ G
-        found = np.vstack([counted, np.eye(p)[self._inputs]])[self._order], G[:3]
-        self._matrices = {key: found}  # of joints that stand still it is the same again
-        return found
+        p = self.robot.platform.p
+        C, B = np.zeros((len(self.names), p)), np.zeros((3, p))
+        self._write_inputs(*self.blocks, np.array(own, dtype=np.float64), C, B)
+        return C, B
 
-    def solved(self, M: Array, counts: Array, steered: Mapping[int, float]) -> tuple[Array, Array]:
-        """The inputs (p,) nearest to the counts (k,), with those known that turn its own joints, and their
-        derivative (p, k); `InputError` names inputs that are not determined."""
+    def solved(self, M: Array, counts: Array, steered: Mapping[int, float]) -> Array:
+        """The inputs (p,) nearest to the counts (k,), with those known that turn its own joints; `InputError`
+        names inputs that are not determined."""
         known, free = np.zeros(M.shape[1]), np.ones(M.shape[1], dtype=bool)
         for coordinate, rate in steered.items():
             known[self.steered[coordinate]] = rate
             free[self.steered[coordinate]] = False
-        slopes = self._inverses.get(key := M.tobytes() + free.tobytes())
-        if slopes is None:
-            slopes = np.zeros(M.T.shape)
-            slopes[free] = np.linalg.pinv(M[:, free])
-            seen = np.diag(slopes @ M)
-            lost = [
-                name
-                for name, share, asked in zip(self.robot.platform.inputs, seen, free, strict=True)
-                if asked and share < 1.0 - 1e-9
-            ]
-            if lost:
-                what = f"the counters do not determine {few(lost)}"
-                expected = "more wheels, or these inputs' own"
-                raise InputError(what, where=self.where, expected=expected, got=few(self.names))
-            self._inverses = {key: slopes}
-        return known + slopes @ (counts - M @ known), slopes
+        slopes = np.zeros(M.T.shape)
+        slopes[free] = np.linalg.pinv(M[:, free])
+        seen = np.diag(slopes @ M)
+        lost = [
+            name
+            for name, share, asked in zip(self.robot.platform.inputs, seen, free, strict=True)
+            if asked and share < 1.0 - 1e-9
+        ]
+        if lost:
+            what = f"the counters do not determine {few(lost)}"
+            expected = "more wheels, or these inputs' own"
+            raise InputError(what, where=self.where, expected=expected, got=few(self.names))
+        return known + slopes @ (counts - M @ known)
 
 
 class Odometry:
@@ -146,8 +149,8 @@ class Odometry:
         self._held = HeldInputs(robot)
         wheels, first = counted_wheels(robot), self._read(encoders)[0]
         self._turns = Turns(self._counters.names, wheels, wrapped, first, self._where)
-        M, _ = self._counters.matrix(self.q[3 : robot.platform.n_p])
-        self._counters.solved(M, first, dict.fromkeys(self._counters.steered, 0.0))  # or says why not
+        self._move = checked_by_caller(motion_of_record, MOTION)
+        self._check_determined(self.q[3 : robot.platform.n_p])
 
     def update(self, encoders: Mapping[str, float], t: float | None = None) -> Array:
         """q (n,) at these readings, rad or m: of the wheels that were counted at first, and of the joints.
@@ -178,41 +181,41 @@ class Odometry:
             _, allowed = apart(float(abs(by[k])), float(most[k]), digits=3)
             raise InputError(what, where=self._where, expected=f"at most {allowed}", got=float(by[k]))
         robot, n_p = self.robot, self.robot.platform.n_p
-        turned = self._shares * by
-        before, after = self.q[3:n_p], ahead[3:n_p]
-        looks = [self._counters.matrix(before + node * (after - before)) for node in NODES]
-        M = 0.5 * (looks[0][0] + looks[1][0])
-        steered = {c: float(ahead[c] - self.q[c]) for c in self._counters.steered}
-        up, slopes = self._counters.solved(M, turned, steered)
-        one, other = (B @ up for _, B in looks)
-        twist = 0.5 * (one + other)
-        twist[:2] += (
-            math.sqrt(3.0)
-            / 12.0
-            * np.array([other[2] * one[1] - one[2] * other[1], one[2] * other[0] - other[2] * one[0]])
-        )
-        way, slope = _moved(twist)
-        c, s = math.cos(self.q[2]), math.sin(self.q[2])
-        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        step = turn @ way
+        before, after = self.q[3:n_p].copy(), ahead[3:n_p].copy()
+        up, twist, slopes = np.zeros(robot.platform.p), np.zeros(3), np.zeros((3, len(by)))
+        if (
+            self._move(*self._counters.blocks, before, after, self._shares * by, up, twist, slopes)
+            < DETERMINED
+        ):
+            self._check_determined(0.5 * (before + after))
+        way, slope, pose = np.zeros(3), np.zeros((3, 3)), self.q[:3].copy()
+        exp_planar(twist, way, slope)
+        compose_planar(pose, way)
         unmeasured = [name for name in self._hitches if name not in encoders]
         if unmeasured:
             u = np.concatenate([up, np.zeros(robot.n_u - robot.platform.p)])
             rolled = self._held(self.q, u, 1.0)
             for name in unmeasured:
                 ahead[robot.coordinate(name)] = rolled[robot.coordinate(name)]
-        ahead[:3] = self.q[:3] + step
+        ahead[:3] = pose
         if self._spread or self.covariance.any():
+            c, s = math.cos(self.q[2]), math.sin(self.q[2])
+            turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
             carried = np.eye(3)
-            carried[:2, 2] = -step[1], step[0]
-            mean = 0.5 * (looks[0][1] + looks[1][1])
-            noise = turn @ slope @ mean @ slopes * self._shares
+            carried[:2, 2] = self.q[1] - pose[1], pose[0] - self.q[0]
+            noise = turn @ slope @ slopes * self._shares
             added = noise * (self._spread * np.abs(by)) @ noise.T
             self.covariance = carried @ self.covariance @ carried.T + added
         self._turns.take(readings, counts)
         self.q = ahead
         self._t = math.nan if t is None else t
         return ahead.copy()
+
+    def _check_determined(self, own: Array) -> None:
+        """`InputError` for inputs that the counters do not show with its own joints at `own` (n_p - 3,)."""
+        M, _ = self._counters.matrix(own)
+        counts = np.zeros(len(self._counters.names))
+        self._counters.solved(M, counts, dict.fromkeys(self._counters.steered, 0.0))
 
     def _by_counter(self, given: float | Mapping[str, float] | None, usual: Array, what: str) -> Array:
         """Numbers (k,), one a counter: the same for all, or by name."""
@@ -250,18 +253,6 @@ class Odometry:
         return counts, self.robot.q_from({**joints, **rest}, self.q[:3], self.q)
 
 
-def _moved(twist: Array) -> tuple[Array, Array]:
-    """The pose (3,) after a constant twist (3,) for a unit of time from the origin, exp of SE(2), and its
-    derivative in the twist (3, 3)."""
-    w = float(twist[2])
-    a, b = float(np.sinc(w / math.pi)), math.sin(0.5 * w) * float(np.sinc(0.5 * w / math.pi))
-    a_w, b_w = (-w / 3.0, 0.5) if abs(w) < _STRAIGHT else ((math.cos(w) - a) / w, (math.sin(w) - b) / w)
-    V, V_w = np.array([[a, -b], [b, a]]), np.array([[a_w, -b_w], [b_w, a_w]])
-    slope = np.eye(3)
-    slope[:2, :2], slope[:2, 2] = V, V_w @ twist[:2]
-    return np.array([*(V @ twist[:2]), w]), slope
-
-
 def wheel_speeds(robot: Robot, u: ArrayLike, q: ArrayLike | None = None) -> dict[str, float]:
     """See `Robot.wheel_speeds`."""
     names, rows = wheel_rates(robot)
@@ -278,4 +269,4 @@ def platform_inputs(robot: Robot, speeds: Mapping[str, float], q: ArrayLike | No
     counters = Counters(robot, speeds, where)
     given = np.array([scalar(value, f"{where}: {name}") for name, value in speeds.items()])
     M, _ = counters.matrix(robot.q(q)[3 : robot.platform.n_p])
-    return counters.solved(M, given, {})[0]
+    return counters.solved(M, given, {})
