@@ -132,6 +132,7 @@ from .plugins.planning.replan import replan as replan
 from .plugins.robot import ros as ros
 from .plugins.robot.loop_state import LoopState as LoopState
 from .plugins.robot.odometry import Odometry as Odometry
+from .plugins.robot.pose_filter import PoseFilter as PoseFilter
 from .plugins.robot.robot_loop import Loop as Loop
 from .plugins.robot.ros.bag import read_bag as read_bag
 from .plugins.sweeps import Sweep as Sweep

@@ -135,11 +135,13 @@ class Odometry:
         self.q = robot.q(q)
         counted = [name for name in encoders if name in (*counted_wheels(robot), *robot.platform.inputs)]
         self._counters = Counters(robot, dict.fromkeys(counted, 0.0), self._where)
-        self._shares = self._by_counter(slip, np.ones(len(counted)), "slip")
+        self.shares = self.by_counter(slip, np.ones(len(counted)), "slip")
         limits = {wheel.joint: wheel.velocity for wheel in robot.wheels}
         usual = np.array([limits.get(name, math.inf) for name in counted])
-        self._fastest = self._by_counter(fastest, usual, "fastest")
+        self._fastest = self.by_counter(fastest, usual, "fastest")
         self._t = math.nan
+        #: How far the counters went at the last update (k,), rad or m.
+        self.last_counts = np.zeros(len(counted))
         self._spread = scalar(spread, f"{self._where}: spread", least=0.0)
         self.covariance = np.zeros((3, 3))
         if covariance is not None:
@@ -151,6 +153,16 @@ class Odometry:
         self._turns = Turns(self._counters.names, wheels, wrapped, first, self._where)
         self._move = checked_by_caller(motion_of_record, MOTION)
         self._check_determined(self.q[3 : robot.platform.n_p])
+
+    @property
+    def counters(self) -> tuple[str, ...]:
+        """What counts, by name, in the order of the encoders at first."""
+        return self._counters.names
+
+    @property
+    def record(self) -> Counted:
+        """What the step of odometry reads."""
+        return self._counters.record
 
     def update(self, encoders: Mapping[str, float], t: float | None = None) -> Array:
         """q (n,) at these readings, rad or m: of the wheels that were counted at first, and of the joints.
@@ -184,7 +196,7 @@ class Odometry:
         before, after = self.q[3:n_p].copy(), ahead[3:n_p].copy()
         up, twist, slopes = np.zeros(robot.platform.p), np.zeros(3), np.zeros((3, len(by)))
         if (
-            self._move(*self._counters.blocks, before, after, self._shares * by, up, twist, slopes)
+            self._move(*self._counters.blocks, before, after, self.shares * by, up, twist, slopes)
             < DETERMINED
         ):
             self._check_determined(0.5 * (before + after))
@@ -203,10 +215,11 @@ class Odometry:
             turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
             carried = np.eye(3)
             carried[:2, 2] = self.q[1] - pose[1], pose[0] - self.q[0]
-            noise = turn @ slope @ slopes * self._shares
+            noise = turn @ slope @ slopes * self.shares
             added = noise * (self._spread * np.abs(by)) @ noise.T
             self.covariance = carried @ self.covariance @ carried.T + added
         self._turns.take(readings, counts)
+        self.last_counts = by
         self.q = ahead
         self._t = math.nan if t is None else t
         return ahead.copy()
@@ -217,7 +230,7 @@ class Odometry:
         counts = np.zeros(len(self._counters.names))
         self._counters.solved(M, counts, dict.fromkeys(self._counters.steered, 0.0))
 
-    def _by_counter(self, given: float | Mapping[str, float] | None, usual: Array, what: str) -> Array:
+    def by_counter(self, given: float | Mapping[str, float] | None, usual: Array, what: str) -> Array:
         """Numbers (k,), one a counter: the same for all, or by name."""
         names, where = self._counters.names, f"{self._where}: {what}"
         if isinstance(given, Mapping):

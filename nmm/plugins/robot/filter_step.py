@@ -1,0 +1,311 @@
+"""An invariant Kalman filter on SE(2) x bias x scales: a step of prediction, and a fix, as plain kernels.
+
+The state is x (d,) = [x, y, theta, gyro bias, scales of the counters], its error eps (d,) in
+
+    T = T_believed exp(eps[:3]),    bias and scales = those believed + eps[3:],
+
+the left-invariant error: along the axes of the body. Wheels and a gyro move T by T exp(xi), with noise along
+these axes, so eps goes on by a matrix of xi alone, and what is known of a pose after turns that were not (a
+banana in x and y) is a Gaussian of eps. A fix, T p + noise, is a left-invariant observation: seen from the
+body that is believed, it depends on eps alone. (A landmark seen from the body would ask for the other error.)
+Neither matrix depends on the heading that is believed, which is why it is not believed too soon.
+
+Sources: A. Barrau, S. Bonnabel, The invariant extended Kalman filter as a stable observer, IEEE Trans.
+Automatic Control 62(4), 2017; for the iterations of `correct`, B. M. Bell, F. W. Cathey, The iterated Kalman
+filter update as a Gauss-Newton method, 1993; for carrying P over to the new estimate, J. Solà, Quaternion
+kinematics for the error-state Kalman filter, 2017, section 6.3.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from nmm.base.arrays import Array
+from nmm.base.kernels.compiled import clear, compiled, scratch
+from nmm.base.kernels.linear_algebra import copied, eliminate
+from nmm.base.kernels.planar_motions import (
+    compose_planar,
+    exp_planar,
+    inverse_adjoint_planar,
+    right_jacobian_planar,
+    to_body_axes,
+)
+from nmm.base.kernels.record_layout import Vector
+from nmm.plugins.robot.counted_motion import Counted, counted_motion
+
+#: Iterations of a fix, and the change of eps, m and rad, at which they end.
+ITERATIONS, CONVERGED = 10, 1e-9
+
+
+class Noise(NamedTuple):
+    """What a filter takes as noise.
+
+    shares, spread (k,) : of each counter, the share of its turning that moves the platform, and the variance
+        of its turning for each radian or m
+    slip (3,) : variances along and across for each m of the way, m, and of the turn for each rad, rad
+    gyro (3,) : variance of a turn for each second, rad²/s; of the walk of its bias, rad²/s³; of that of the
+        scales, 1/s
+    """
+
+    shares: Vector
+    spread: Vector
+    slip: Vector
+    gyro: Vector
+
+
+@compiled
+def carry_over(x: Array, P: Array, eps: Array) -> None:
+    """x (d,) goes on by eps (d,), and its covariance P (d, d) becomes that of the error to the new x."""
+    d = x.shape[0]
+    step, J, rows = scratch(3), scratch((3, 3)), scratch((3, d))
+    right_jacobian_planar(eps, step, J)
+    compose_planar(x, step)
+    for i in range(3, d):
+        x[i] += eps[i]
+    replace_rows(J, P, rows)
+    for i in range(3):
+        for j in range(3):
+            P[i, j] = rows[i, 0] * J[j, 0] + rows[i, 1] * J[j, 1] + rows[i, 2] * J[j, 2]
+        for j in range(3, d):
+            P[i, j] = P[j, i] = rows[i, j]
+
+
+@compiled
+def replace_rows(J: Array, P: Array, rows: Array) -> None:
+    """rows (3, d) = J P, J (3, 3) or (3, d)."""
+    for i in range(3):
+        for j in range(P.shape[0]):
+            rows[i, j] = 0.0
+            for k in range(J.shape[1]):
+                rows[i, j] += J[i, k] * P[k, j]
+
+
+@compiled
+def predict(
+    counted: Counted,
+    noise: Noise,
+    dt: float,
+    by: Array,
+    own: Array,
+    ahead: Array,
+    rate: float,
+    x: Array,
+    P: Array,
+    step: Array,
+) -> None:
+    """x (d,) and P (d, d) after dt, s, in which the counters counted by (k,), the platform's own joints went
+    from `own` to `ahead` (n_p - 3,), and a gyro measured a mean rate, rad/s, NaN without; step (3,) : the
+    motion.
+
+    The gyro measures the turn of this step, which has wheels for a prior, and its bias: both learn from the
+    difference before the pose goes on, so a robot that stands still shows its gyro's bias.
+    """
+    d, k, p = x.shape[0], by.shape[0], counted.steered.shape[0]
+    turned, up, twist, slopes = scratch(k), scratch(p), scratch(3), scratch((3, k))
+    scaled = d > 4
+    for c in range(k):
+        turned[c] = noise.shares[c] * by[c] * (1.0 + x[4 + c] if scaled else 1.0)
+    counted_motion(counted, own, ahead, turned, up, twist, slopes)
+    Q, eps, pull, shift = scratch((3, 3)), scratch(d), scratch(d), scratch(3)
+    for i in range(3):
+        for j in range(3):
+            Q[i, j] = 0.0
+            for c in range(k):
+                share = noise.shares[c] * noise.shares[c] * noise.spread[c] * abs(by[c])
+                Q[i, j] += slopes[i, c] * share * slopes[j, c]
+        way = abs(twist[2]) if i == 2 else math.sqrt(twist[0] * twist[0] + twist[1] * twist[1])
+        Q[i, i] += noise.slip[i] * way
+    for c in range(k):  # from here on in the scales
+        for i in range(3):
+            slopes[i, c] *= noise.shares[c] * by[c]
+    clear(eps)
+    clear(pull)
+    clear(shift)
+    S = 0.0
+    if not math.isnan(rate):
+        for i in range(d):
+            pull[i] = P[i, 3] * dt
+            if scaled:
+                for c in range(k):
+                    pull[i] += P[i, 4 + c] * slopes[2, c]
+        S = Q[2, 2] + noise.gyro[0] * dt + dt * pull[3]
+        if scaled:
+            for c in range(k):
+                S += slopes[2, c] * pull[4 + c]
+        residual = (rate - x[3]) * dt - twist[2]
+        for i in range(d):
+            pull[i] /= S
+            eps[i] = pull[i] * residual
+        for i in range(3):
+            shift[i] = Q[i, 2] / S
+            twist[i] += shift[i] * residual
+            if scaled:
+                for c in range(k):
+                    twist[i] += slopes[i, c] * eps[4 + c]
+    A, Ad, J, G, rows = scratch((3, d)), scratch((3, 3)), scratch((3, 3)), scratch((3, 3)), scratch((3, d))
+    right_jacobian_planar(eps, step, J)
+    compose_planar(x, step)
+    right_jacobian_planar(twist, step, G)
+    inverse_adjoint_planar(step, Ad)
+    compose_planar(x, step)
+    clear(A)
+    for i in range(3):
+        for j in range(3):
+            for m in range(3):
+                A[i, j] += Ad[i, m] * J[m, j]
+        if scaled:
+            for c in range(k):
+                for m in range(3):
+                    A[i, 4 + c] += G[i, m] * slopes[m, c]
+    replace_rows(A, P, rows)
+    for i in range(3):
+        for j in range(3):
+            P[i, j] = 0.0
+            for m in range(d):
+                P[i, j] += rows[i, m] * A[j, m]
+            for m in range(3):
+                for n in range(3):
+                    P[i, j] += G[i, m] * Q[m, n] * G[j, n]
+        for j in range(3, d):
+            P[i, j] = P[j, i] = rows[i, j]
+    if S > 0.0:
+        for i in range(3, d):
+            x[i] += eps[i]
+        for i in range(3):
+            rows[i, 0] = 0.0
+            for m in range(d):
+                rows[i, 0] += A[i, m] * pull[m]
+            for m in range(3):
+                rows[i, 0] += G[i, m] * shift[m]
+        for i in range(3):
+            pull[i] = rows[i, 0]
+        for i in range(d):
+            for j in range(d):
+                P[i, j] -= pull[i] * S * pull[j]
+    P[3, 3] += noise.gyro[1] * dt
+    for i in range(4, d):
+        P[i, i] += noise.gyro[2] * dt
+
+
+@compiled
+def correct(rows: int, y: Array, covariance: Array, at: Array, gate: float, x: Array, P: Array) -> float:
+    """x (d,) and P (d, d) after a fix; the normalised innovation squared, above `gate` for an outlier, which
+    changes nothing.
+
+    rows : 2 for a position, 3 with a heading; y (3,), covariance (3, 3) : x, y, theta in the world's axes, of
+    which the first `rows` count; at (2,) : the point of the body whose position it is, m
+
+    eps is that of least eps' P⁻¹ eps + r' R⁻¹ r, r what the fix leaves, by Gauss and Newton: one iteration is
+    the extended filter's. At the end this least is the innovation squared.
+    """
+    d = x.shape[0]
+    z, R, eps, place, D = scratch(3), scratch((3, 3)), scratch(d), scratch(3), scratch((3, 3))
+    S, scales, PH, gain = scratch((rows, rows + 1)), scratch(rows), scratch((d, rows)), scratch((d, rows))
+    seen(rows, y, covariance, x, z, R)
+    clear(eps)
+    square = 0.0
+    for _ in range(ITERATIONS):
+        exp_planar(eps, place, D)
+        offset(eps[2], at, place, D)
+        for m in range(rows):
+            for i in range(d):
+                PH[i, m] = P[i, 0] * D[m, 0] + P[i, 1] * D[m, 1] + P[i, 2] * D[m, 2]
+        for m in range(rows):
+            scales[m] = 1.0
+            for n in range(rows):
+                S[m, n] = R[m, n] + D[m, 0] * PH[0, n] + D[m, 1] * PH[1, n] + D[m, 2] * PH[2, n]
+            S[m, rows] = z[m] - place[m] + D[m, 0] * eps[0] + D[m, 1] * eps[1] + D[m, 2] * eps[2]
+            gain[0, m] = S[m, rows]
+        eliminate(S, scales)
+        square, change = 0.0, 0.0
+        for m in range(rows):
+            square += gain[0, m] * S[m, rows]
+        for i in range(d):
+            value = 0.0
+            for m in range(rows):
+                value += PH[i, m] * S[m, rows]
+            change = max(change, abs(value - eps[i]))
+            eps[i] = value
+        if change < CONVERGED:
+            break
+    if not square <= gate:
+        return square
+    gains(rows, R, D, PH, gain)
+    joseph(rows, R, D, gain, P)
+    carry_over(x, P, eps)
+    return square
+
+
+@compiled
+def seen(rows: int, y: Array, covariance: Array, x: Array, z: Array, R: Array) -> None:
+    """A fix as the body that is believed sees it: z (3,), and its covariance R (3, 3)."""
+    c, s = math.cos(x[2]), math.sin(x[2])
+    ahead, aside = y[0] - x[0], y[1] - x[1]
+    z[0], z[1] = c * ahead + s * aside, c * aside - s * ahead
+    z[2] = 0.0
+    if rows == 3:
+        turn = y[2] - x[2]
+        z[2] = turn - 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
+    turned = scratch((3, 3))
+    for i in range(3):
+        for j in range(3):
+            turned[i, j] = covariance[i, j]
+    to_body_axes(x[2], turned)
+    for i in range(3):
+        for j in range(3):
+            R[j, i] = turned[i, j]
+    to_body_axes(x[2], R)
+
+
+@compiled
+def offset(angle: float, at: Array, place: Array, D: Array) -> None:
+    """Add a point `at` (2,) of the body to its place (3,), and to the derivative D (3, 3)."""
+    c, s = math.cos(angle), math.sin(angle)
+    place[0] += c * at[0] - s * at[1]
+    place[1] += s * at[0] + c * at[1]
+    D[0, 2] -= s * at[0] + c * at[1]
+    D[1, 2] += c * at[0] - s * at[1]
+
+
+@compiled
+def gains(rows: int, R: Array, D: Array, PH: Array, gain: Array) -> None:
+    """gain (d, rows) = PH S⁻¹, S = D P Dᵀ + R."""
+    d = gain.shape[0]
+    M, scales = scratch((rows, rows + d)), scratch(rows)
+    for m in range(rows):
+        scales[m] = 1.0
+        for n in range(rows):
+            M[m, n] = R[m, n] + D[m, 0] * PH[0, n] + D[m, 1] * PH[1, n] + D[m, 2] * PH[2, n]
+        for i in range(d):
+            M[m, rows + i] = PH[i, m]
+    eliminate(M, scales)
+    for m in range(rows):
+        for i in range(d):
+            gain[i, m] = M[m, rows + i]
+
+
+@compiled
+def joseph(rows: int, R: Array, D: Array, gain: Array, P: Array) -> None:
+    """P (d, d) = (I - K H) P (I - K H)ᵀ + K R Kᵀ, H = [D 0]: which rounding leaves positive."""
+    d = P.shape[0]
+    HP, left = scratch((rows, d)), scratch((d, d))
+    for m in range(rows):
+        for j in range(d):
+            HP[m, j] = D[m, 0] * P[0, j] + D[m, 1] * P[1, j] + D[m, 2] * P[2, j]
+    for i in range(d):
+        copied(P[i], left[i])
+        for m in range(rows):
+            for j in range(d):
+                left[i, j] -= gain[i, m] * HP[m, j]
+    for i in range(d):
+        for m in range(rows):
+            HP[m, i] = left[i, 0] * D[m, 0] + left[i, 1] * D[m, 1] + left[i, 2] * D[m, 2]
+            for n in range(rows):
+                HP[m, i] -= gain[i, n] * R[n, m]
+    for i in range(d):
+        for j in range(i + 1):
+            value = left[i, j]
+            for m in range(rows):
+                value -= HP[m, i] * gain[j, m]
+            P[i, j] = P[j, i] = value

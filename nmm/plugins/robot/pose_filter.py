@@ -1,0 +1,322 @@
+"""Where a platform is by its wheels, a gyro and fixes of its pose, with what is not known of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import chi2
+
+from nmm.base.arrays import Array, counted, matrix, positive, scalar, vector
+from nmm.base.errors import InputError, expect
+from nmm.base.kernels.compiled import checked_by_caller
+from nmm.base.kernels.record_layout import views
+from nmm.model.robots.robot import Robot
+from nmm.plugins.robot import filter_history as rings
+from nmm.plugins.robot.filter_step import Noise
+from nmm.plugins.robot.odometry import Odometry
+
+#: What became of a fix, by the codes of `filter_history`.
+OUTCOMES = ("waiting", "used", "outlier", "late", "early", "crowded")
+
+
+class PoseFilter:
+    """Where a platform is by its wheels' encoders, a gyro and fixes of its pose: an invariant Kalman filter
+    on SE(2), the gyro's bias and, if wanted, a scale of each counter.
+
+    Motion is that of `Odometry`, for every platform; noise is of what wheels turn, of slip, and of the gyro.
+    A fix may come late and out of order: it is taken where its time belongs, and what came after it again. It
+    waits for encoders that have not reached its time.
+
+    The error is the left-invariant one, T = T_believed exp(eps), along the body's axes. How it goes on, and
+    what fixes in the world say of it, depends on no heading that is believed: the filter is consistent even
+    where fixes are positions alone and the heading is hardly known at first; one in (x, y, theta) is not.
+
+    Frames are as in REP-105: `odom` goes on without jumps; fixes change `map_to_odom`.
+
+    Parameters
+    ----------
+    robot : with a platform that moves
+    q (n,) : where it stands at first, m and rad
+    encoders : readings there, by name, as for `Robot.odometry`
+    t : their time, s
+    covariance (3, 3) : of x, y, theta at first, in the world's axes
+    spread : variance of a counter's turning for each radian (metre) that it counts, rad²/rad: a number, or by
+        name
+    slip_noise : standard deviations of what the platform slips: along and across, m for the root of each m of
+        way, and in heading, rad for the root of each rad of turn
+    slip : the share of a wheel's turning that moves the platform: a number, or by name
+    gyro_noise : density of the yaw rate's noise, rad/s/√Hz; None without a gyro
+    bias_deviation, bias_walk : the gyro's bias at first is zero to so much, rad/s, and walks by so much,
+        rad/s for the root of each s
+    scale_deviation, scale_walk : likewise of each counter's scale, a share of its turning, and 1/√s: a tyre
+        that loses air. With 0 and 0 the scales are no part of the state
+    delay : fixes may come so late, s
+    rate : readings a second, at most; with more, fixes may come less late
+    fixes : how many of the last `delay` are remembered
+    gate : the share of fixes that should pass, were all as they say; those beyond are outliers, and change
+        nothing. None: all pass
+    fastest, wrapped : as for `Robot.odometry`
+
+    Raises
+    ------
+    InputError : what `Robot.odometry` refuses; matrices that are no covariances; numbers out of range
+
+    Source: A. Barrau, S. Bonnabel, The invariant extended Kalman filter as a stable observer, IEEE Trans.
+    Automatic Control 62(4), 2017.
+
+    Examples
+    --------
+    >>> robot = nmm.load("differential_base")
+    >>> still = {"left_wheel_joint": 0.0, "right_wheel_joint": 0.0}
+    >>> known = np.diag([0.01, 0.01, 0.25])  # the heading to half a radian
+    >>> pose_filter = nmm.PoseFilter(robot, robot.rest, still, 0.0, covariance=known, spread=1e-4)
+    >>> for k in range(1, 101):  # 1 m in 1 s
+    ...     q = pose_filter.update({name: 0.1 * k for name in still}, 0.01 * k)
+    >>> pose_filter.fix([0.8, 0.6], np.diag([1e-4, 1e-4]), t=1.0)  # it went to the left
+    'used'
+    >>> pose_filter.pose.round(2), pose_filter.odom.round(2)
+    (array([0.8 , 0.6 , 0.62]), array([1., 0., 0.]))
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        q: ArrayLike,
+        encoders: Mapping[str, float],
+        t: float,
+        *,
+        covariance: ArrayLike,
+        spread: float | Mapping[str, float],
+        slip_noise: ArrayLike = (0.0, 0.0, 0.0),
+        slip: float | Mapping[str, float] = 1.0,
+        gyro_noise: float | None = None,
+        bias_deviation: float = 0.0,
+        bias_walk: float = 0.0,
+        scale_deviation: float = 0.0,
+        scale_walk: float = 0.0,
+        delay: float = 0.5,
+        rate: float = 200.0,
+        fixes: int = 64,
+        gate: float | None = 0.999,
+        fastest: float | Mapping[str, float] | None = None,
+        wrapped: bool | Collection[str] | None = None,
+    ) -> None:
+        self._where = where = f"PoseFilter: {robot.name}"
+        self.robot = robot
+        self._odometry = Odometry(robot, q, encoders, slip, fastest=fastest, wrapped=wrapped)
+        self.counters = self._odometry.counters
+        k = len(self.counters)
+        variances = self._odometry.by_counter(spread, np.zeros(k), "spread")
+        expect(bool((variances >= 0.0).all()), f"{where}: spread", "numbers from 0", variances)
+        slips = vector(slip_noise, 3, f"{where}: slip_noise")
+        self._has_gyro = gyro_noise is not None
+        gyro = 0.0 if gyro_noise is None else positive(gyro_noise, f"{where}: gyro_noise")
+        named = {"bias_deviation": bias_deviation, "bias_walk": bias_walk}
+        named |= {"scale_deviation": scale_deviation, "scale_walk": scale_walk}
+        bias, walk, scale, drift = (scalar(v, f"{where}: {n}", least=0.0) for n, v in named.items())
+        d = 4 + (k if scale > 0.0 or drift > 0.0 else 0)
+        seconds = positive(delay, f"{where}: delay")
+        steps = math.ceil(seconds * positive(rate, f"{where}: rate")) + 2
+        places = counted(fixes, f"{where}: fixes")
+        gates = np.full(2, np.inf)
+        if gate is not None:
+            gates = chi2.ppf(scalar(gate, f"{where}: gate", above=0.0, below=1.0), [2, 3])
+        self._joints = self._odometry.q
+        noise = Noise(self._odometry.shares, variances, slips**2, np.array([gyro, walk, drift]) ** 2)
+        sizes = steps, places, d
+        self._blocks = rings.new_history(
+            self._odometry.record, noise, gates, seconds, sizes, self._joints[:3]
+        )
+        self._history = views(rings.History, *self._blocks, 0)
+        self._advance = checked_by_caller(rings.advance, rings.ADVANCE)
+        self._add_fix = checked_by_caller(rings.add_fix, rings.ADD_FIX)
+        self._still = np.zeros(k)
+        x, P = np.zeros(d), np.zeros((d, d))
+        P[3:, 3:] = np.diag([bias**2, *np.full(d - 4, scale**2)])
+        self._start(scalar(t, f"{where}: t"), self._joints[:3], covariance, x, P)
+
+    def _start(self, t: float, pose: ArrayLike, covariance: ArrayLike, x: Array, P: Array) -> None:
+        """Begin at t with a pose (3,), of covariance (3, 3), and else with x (d,) and P (d, d)."""
+        steps = self._history.steps
+        x[:3] = vector(pose, 3, f"{self._where}: pose")
+        wanted = "a covariance: symmetric, no negative variance"
+        given = matrix(covariance, (3, 3), f"{self._where}: covariance")
+        size = float(np.abs(given).max())
+        definite = np.allclose(given, given.T, rtol=0.0, atol=1e-9 * size)
+        definite &= bool(np.linalg.eigvalsh(given).min() >= -1e-9 * size)
+        expect(definite, f"{self._where}: covariance", wanted, given)
+        turn = _turn(x[2])
+        P[:3] = P[:, :3] = 0.0
+        P[:3, :3] = turn.T @ given @ turn
+        steps.end[0], steps.ahead[0] = np.nextafter(t, -np.inf), self._joints[3 : self.robot.platform.n_p]
+        steps.x[0], steps.P[0] = x, P
+        self._history.newest[()], self._history.stored[()], self._history.fixed[()] = 0, 1, 0
+        self.step(t, self._still)  # fixes of this time count from here on
+
+    def update(self, encoders: Mapping[str, float], t: float, yaw_rate: float | None = None) -> Array:
+        """q (n,) at these readings, rad or m: the pose in the map, and the joints.
+
+        Parameters
+        ----------
+        encoders : as for `Odometry.update`
+        t : when they were read, s, later than before
+        yaw_rate : mean of the gyro since then, rad/s, about z; None where there is none
+
+        Raises
+        ------
+        InputError : as of `Odometry.update`, and of `step`; nothing is changed then
+        """
+        self._check_step(t, yaw_rate)
+        self._joints = self._odometry.update(encoders, t)
+        self.step(t, self._odometry.last_counts, self._joints[3 : self.robot.platform.n_p], yaw_rate)
+        return self.q
+
+    def step(
+        self, t: float, by: ArrayLike, own: ArrayLike | None = None, yaw_rate: float | None = None
+    ) -> None:
+        """The same without names, for fast loops: how far the counters went, (k,) in the order of `counters`,
+        rad or m, and where the platform's own joints are now, (n_p - 3,), where they were by default.
+
+        Raises
+        ------
+        InputError : t is not later than before, other lengths, numbers that are not finite; nothing is
+            changed then
+        """
+        self._check_step(t, yaw_rate)
+        steps = self._history.steps
+        by = np.ascontiguousarray(by, dtype=np.float64)
+        joints = steps.ahead[self._history.newest[()]] if own is None else own
+        joints = np.ascontiguousarray(joints, dtype=np.float64)
+        if by.shape != self._still.shape or joints.shape != steps.ahead[0].shape:
+            expected = f"{self._still.size} counters and {steps.ahead.shape[1]} joints"
+            raise InputError(where=f"{self._where}: step", expected=expected, got=(by, joints))
+        if not self._advance(*self._blocks, t, by, joints, math.nan if yaw_rate is None else yaw_rate):
+            raise InputError(where=f"{self._where}: step", expected="finite numbers", got=(by, joints))
+
+    def _check_step(self, t: float, yaw_rate: float | None) -> None:
+        if not self.t < t < math.inf:
+            raise InputError(where=f"{self._where}: t", expected=f"a time after {self.t:g} s", got=t)
+        if yaw_rate is not None and not (self._has_gyro and math.isfinite(yaw_rate)):
+            expected = "a finite number" if self._has_gyro else "a filter with gyro_noise"
+            raise InputError(where=f"{self._where}: yaw_rate", expected=expected, got=yaw_rate)
+
+    def fix(self, pose: ArrayLike, covariance: ArrayLike, t: float, at: ArrayLike = (0.0, 0.0)) -> str:
+        """Take a fix in the map: x, y, theta or x, y alone, m and rad.
+
+        Parameters
+        ----------
+        pose : (3,) or (2,); theta by full turns as it comes
+        covariance : (3, 3) or (2, 2), positive definite, in the map's axes
+        t : when it was so, s
+        at (2,) : the point of the platform whose x and y these are, in its own axes, m: an antenna
+
+        Returns
+        -------
+        str : "used"; "outlier", beyond the gate; "waiting" for encoders of its time; "late" or "early" by
+            more than `delay`, "crowded" where `fixes` are remembered: these three are not used
+
+        Raises
+        ------
+        InputError : other shapes, numbers that are not finite, a matrix that is no covariance
+        """
+        where = f"{self._where}: fix"
+        y = vector(pose, (2, 3), where)
+        rows = y.size
+        R = matrix(covariance, (rows, rows), f"{where}: covariance")
+        positive_definite = R[0, 0] > 0.0 and R[0, 0] * R[1, 1] > R[0, 1] * R[1, 0] and bool((R == R.T).all())
+        if rows == 3:
+            positive_definite &= bool(np.linalg.det(R) > 0.0)
+        expect(positive_definite, f"{where}: covariance", "a symmetric matrix, positive definite", R)
+        place, full = np.zeros(3), np.zeros((3, 3))
+        place[:rows], full[:rows, :rows] = y, R
+        lever, time = vector(at, 2, f"{where}: at"), scalar(t, f"{where}: t")
+        return OUTCOMES[self._add_fix(*self._blocks, time, rows, place, full, lever)]
+
+    def restart(self, pose: ArrayLike, covariance: ArrayLike) -> None:
+        """Put the platform at a pose (3,), m and rad, with its covariance (3, 3): it was carried away, or all
+        fixes are outliers. What came before is forgotten, but for bias and scales; `odom` goes on."""
+        x, P, t = self._x.copy(), self._P.copy(), self.t
+        expect(bool(np.isfinite(vector(pose, 3, f"{self._where}: pose")).all()), "pose", "numbers", pose)
+        self._start(float(np.nextafter(t, np.inf)), pose, covariance, x, P)
+
+    @property
+    def _x(self) -> Array:
+        return np.asarray(self._history.steps.x[self._history.newest[()]])
+
+    @property
+    def _P(self) -> Array:
+        return np.asarray(self._history.steps.P[self._history.newest[()]])
+
+    @property
+    def t(self) -> float:
+        """Time of the last readings, s."""
+        return float(self._history.steps.end[self._history.newest[()]])
+
+    @property
+    def pose(self) -> Array:
+        """(3,) x, y, theta in the map, m and rad; theta is not wrapped."""
+        return self._x[:3].copy()
+
+    @property
+    def q(self) -> Array:
+        """(n,) the same, and the joints as of the last `update`, m and rad."""
+        q = self._joints.copy()
+        q[:3] = self._x[:3]
+        return q
+
+    @property
+    def covariance(self) -> Array:
+        """(3, 3) of x, y, theta in the map's axes, m and rad."""
+        turn = _turn(float(self._x[2]))
+        return turn @ self._P[:3, :3] @ turn.T
+
+    @property
+    def state_covariance(self) -> Array:
+        """(d, d) of the error: along and across the platform, m, of theta, rad, of the bias, rad/s, and of
+        the scales."""
+        return self._P.copy()
+
+    @property
+    def odom(self) -> Array:
+        """(3,) the pose in odom, m and rad: the same motions, without jumps; fixes change but the bias and
+        the scales of later motions."""
+        return self._history.odom.copy()
+
+    @property
+    def map_to_odom(self) -> Array:
+        """(3,) the pose of odom in the map, m and rad: what a fix makes jump."""
+        (x, y, theta), (x_o, y_o, theta_o) = self._x[:3], self._history.odom
+        turned = theta - theta_o
+        c, s = math.cos(turned), math.sin(turned)
+        return np.array([x - c * x_o + s * y_o, y - s * x_o - c * y_o, math.remainder(turned, 2.0 * math.pi)])
+
+    @property
+    def bias(self) -> float:
+        """Of the gyro, rad/s."""
+        return float(self._x[3])
+
+    @property
+    def scales(self) -> dict[str, float]:
+        """By which each counter's turning is multiplied, beside its `slip`; 1 where they are no part of the
+        state."""
+        found = 1.0 + self._x[4:] if len(self._x) > 4 else np.ones(len(self.counters))
+        return dict(zip(self.counters, found.tolist(), strict=True))
+
+    @property
+    def outliers(self) -> int:
+        """How many of the last fixes, by their times, were outliers, one after another."""
+        fixes, count = self._history.fixes, 0
+        for place in fixes.order[: self._history.fixed[()]][::-1]:
+            if fixes.outcome[place] == rings.USED:
+                break
+            count += int(fixes.outcome[place] == rings.OUTLIER)
+        return count
+
+
+def _turn(theta: float) -> Array:
+    """diag(R, 1) from the platform's axes to the map's."""
+    c, s = math.cos(theta), math.sin(theta)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
