@@ -28,7 +28,9 @@ from nmm.plugins.robot.counted_motion import Counted
 from nmm.plugins.robot.filter_step import Noise, correct, predict
 
 #: What became of a fix: `pose_filter.OUTCOMES` has the words.
-WAITING, USED, OUTLIER, LATE, EARLY, CROWDED = range(6)
+WAITING, USED, OUTLIER, LATE, EARLY, CROWDED, INVALID = range(7)
+#: A covariance's halves may differ by such a share of a variance.
+SYMMETRIC = 1e-9
 
 
 class Steps(NamedTuple):
@@ -90,7 +92,8 @@ def new_history(
             ),
             Fixes(
                 *(np.zeros(places), np.zeros((places, 3)), np.zeros((places, 3, 3)), np.zeros((places, 2))),
-                *(np.zeros(places), np.zeros(places), np.zeros(places), np.arange(places)),
+                np.zeros(places),
+                *(np.zeros(places, np.int64), np.zeros(places, np.int64), np.arange(places, dtype=np.int64)),
             ),
             *(gates, np.array(delay), odom, np.array(0), np.array(1), np.array(0)),
         )
@@ -169,14 +172,37 @@ def advance(integers: Integers, floats: Array, t: float, by: Array, ahead: Array
 
 
 @compiled
-def add_fix(
-    integers: Integers, floats: Array, t: float, rows: int, y: Array, covariance: Array, at: Array
-) -> int:
-    """What becomes of a fix of time t, s; the steps since then are taken again."""
+def is_fix(y: Array, R: Array, at: Array) -> bool:
+    """Whether all is finite, and R, (2, 2) or (3, 3), symmetric and positive definite."""
+    rows, largest = y.shape[0], 0.0
+    for i in range(rows):
+        if not (math.isfinite(y[i]) and R[i, i] > 0.0):
+            return False
+        largest = max(largest, R[i, i])
+    for i in range(rows):
+        for j in range(rows):
+            if not (math.isfinite(R[i, j]) and abs(R[i, j] - R[j, i]) <= SYMMETRIC * largest):
+                return False
+    minor = R[0, 0] * R[1, 1] - R[0, 1] * R[1, 0]
+    if not (minor > 0.0 and math.isfinite(at[0]) and math.isfinite(at[1])):
+        return False
+    if rows == 2:
+        return True
+    first = R[2, 0] * (R[0, 1] * R[1, 2] - R[0, 2] * R[1, 1])
+    return first - R[2, 1] * (R[0, 0] * R[1, 2] - R[0, 2] * R[1, 0]) + R[2, 2] * minor > 0.0
+
+
+@compiled
+def add_fix(integers: Integers, floats: Array, t: float, y: Array, covariance: Array, at: Array) -> int:
+    """What becomes of a fix (2,) or (3,) of time t, s; the steps since then are taken again."""
+    if not is_fix(y, covariance, at):
+        return INVALID
     history = views(History, integers, floats, 0)
     steps, fixes = history.steps, history.fixes
     count, newest = steps.end.shape[0], int(history.newest[()])
     oldest = (newest - int(history.stored[()]) + 1) % count
+    if not math.isfinite(t):
+        return INVALID
     if not t > steps.end[oldest] or t < steps.end[newest] - history.delay[()]:
         return LATE
     if t > steps.end[newest] + history.delay[()]:
@@ -186,11 +212,13 @@ def add_fix(
     if last == fixes.t.shape[0]:
         return CROWDED
     fix = int(fixes.order[last])  # the places behind the last are free
+    rows = y.shape[0]
     fixes.t[fix], fixes.rows[fix], fixes.outcome[fix] = t, rows, WAITING
-    copied(y, fixes.y[fix])
     copied(at, fixes.at[fix])
     for i in range(3):
-        copied(covariance[i], fixes.covariance[fix, i])
+        fixes.y[fix, i] = y[i] if i < rows else 0.0
+        for j in range(3):
+            fixes.covariance[fix, i, j] = covariance[i, j] if i < rows and j < rows else 0.0
     while last > 0 and fixes.t[int(fixes.order[last - 1])] > t:
         fixes.order[last] = fixes.order[last - 1]
         last -= 1
@@ -226,4 +254,4 @@ def forget_fixes(history: History, before: float) -> None:
 
 _FLAT = float64[::1]
 ADVANCE = boolean(int64[::1], _FLAT, float64, _FLAT, _FLAT, float64)
-ADD_FIX = int64(int64[::1], _FLAT, float64, int64, _FLAT, float64[:, ::1], _FLAT)
+ADD_FIX = int64(int64[::1], _FLAT, float64, _FLAT, float64[:, ::1], _FLAT)

@@ -7,9 +7,8 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import chi2
 
-from nmm.base.arrays import Array, counted, matrix, positive, scalar, vector
+from nmm.base.arrays import Array, array, counted, matrix, positive, scalar, vector
 from nmm.base.errors import InputError, expect
 from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.record_layout import views
@@ -20,6 +19,7 @@ from nmm.plugins.robot.odometry import Odometry
 
 #: What became of a fix, by the codes of `filter_history`.
 OUTCOMES = ("waiting", "used", "outlier", "late", "early", "crowded")
+_POSES = (2,), (3,)
 
 
 class PoseFilter:
@@ -123,7 +123,7 @@ class PoseFilter:
         places = counted(fixes, f"{where}: fixes")
         gates = np.full(2, np.inf)
         if gate is not None:
-            gates = chi2.ppf(scalar(gate, f"{where}: gate", above=0.0, below=1.0), [2, 3])
+            gates[:] = _gates(scalar(gate, f"{where}: gate", above=0.0, below=1.0))
         self._joints = self._odometry.q
         noise = Noise(self._odometry.shares, variances, slips**2, np.array([gyro, walk, drift]) ** 2)
         sizes = steps, places, d
@@ -222,25 +222,25 @@ class PoseFilter:
         ------
         InputError : other shapes, numbers that are not finite, a matrix that is no covariance
         """
+        y, R, lever = map(_numbers, (pose, covariance, at))
         where = f"{self._where}: fix"
-        y = vector(pose, (2, 3), where)
-        rows = y.size
-        R = matrix(covariance, (rows, rows), f"{where}: covariance")
-        positive_definite = R[0, 0] > 0.0 and R[0, 0] * R[1, 1] > R[0, 1] * R[1, 0] and bool((R == R.T).all())
-        if rows == 3:
-            positive_definite &= bool(np.linalg.det(R) > 0.0)
-        expect(positive_definite, f"{where}: covariance", "a symmetric matrix, positive definite", R)
-        place, full = np.zeros(3), np.zeros((3, 3))
-        place[:rows], full[:rows, :rows] = y, R
-        lever, time = vector(at, 2, f"{where}: at"), scalar(t, f"{where}: t")
-        return OUTCOMES[self._add_fix(*self._blocks, time, rows, place, full, lever)]
+        shaped = y.shape in _POSES and R.shape == (y.size, y.size) and lever.shape == (2,)
+        if not (shaped and isinstance(t, float)):
+            y, lever, t = vector(pose, (2, 3), where), vector(at, 2, f"{where}: at"), scalar(t, f"{where}: t")
+            R = matrix(covariance, (y.size, y.size), f"{where}: covariance")
+        code = self._add_fix(*self._blocks, t, y, R, lever)
+        if code == rings.INVALID:
+            for name, value in (("", y), (": covariance", R), (": at", lever), (": t", t)):
+                array(value, where + name)
+            expected = "a symmetric matrix, positive definite"
+            raise InputError(where=f"{where}: covariance", expected=expected, got=R)
+        return OUTCOMES[code]
 
     def restart(self, pose: ArrayLike, covariance: ArrayLike) -> None:
         """Put the platform at a pose (3,), m and rad, with its covariance (3, 3): it was carried away, or all
         fixes are outliers. What came before is forgotten, but for bias and scales; `odom` goes on."""
-        x, P, t = self._x.copy(), self._P.copy(), self.t
-        expect(bool(np.isfinite(vector(pose, 3, f"{self._where}: pose")).all()), "pose", "numbers", pose)
-        self._start(float(np.nextafter(t, np.inf)), pose, covariance, x, P)
+        later = float(np.nextafter(self.t, np.inf))
+        self._start(later, pose, covariance, self._x.copy(), self._P.copy())
 
     @property
     def _x(self) -> Array:
@@ -314,6 +314,27 @@ class PoseFilter:
                 break
             count += int(fixes.outcome[place] == rings.OUTLIER)
         return count
+
+
+def _gates(share: float) -> tuple[float, float]:
+    """Below which this share of squares of 2 and of 3 normal numbers lies (SciPy is no part of a robot's
+    install)."""
+    low, high = 0.0, 1e3
+    for _ in range(100):
+        middle = 0.5 * (low + high)
+        beyond = math.erfc(math.sqrt(0.5 * middle)) + math.sqrt(2 * middle / math.pi) * math.exp(
+            -0.5 * middle
+        )
+        low, high = (middle, high) if beyond > 1.0 - share else (low, middle)
+    return -2.0 * math.log1p(-share), middle
+
+
+def _numbers(value: ArrayLike) -> Array:
+    """A float64 array, empty for what is none."""
+    try:
+        return np.ascontiguousarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        return np.zeros(0)
 
 
 def _turn(theta: float) -> Array:

@@ -16,6 +16,7 @@ from scipy.stats import chi2
 import nmm
 from nmm.base.errors import InputError
 from nmm.model.robots.robot import Robot
+from nmm.plugins.robot.pose_filter import _gates
 
 Array = np.ndarray
 RADIUS, TRACK = 0.1, 0.5
@@ -259,6 +260,11 @@ def test_the_gate_lets_through_the_share_that_it_says() -> None:
         y = math.sqrt(0.03) * rng.standard_normal(2)
         passed += pose_filter.fix(y, 0.02 * np.eye(2), pose_filter.t) == "used"
     assert abs(passed - 0.9 * count) < 3 * math.sqrt(0.09 * count)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.95, 0.999])
+def test_the_gates_are_quantiles(share: float) -> None:
+    np.testing.assert_allclose(_gates(share), chi2.ppf(share, [2, 3]), rtol=1e-9)
 
 
 def test_odom_goes_on_where_the_map_jumps() -> None:

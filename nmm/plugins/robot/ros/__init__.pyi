@@ -3,6 +3,7 @@ from .frames import odometry as odometry
 from .joint_states import JointStates as JointStates
 from .making import Messages as Messages
 from .reading import base as base
+from .reading import base_covariance as base_covariance
 from .reading import inputs as inputs
 from .reading import joint_trajectory as joint_trajectory
 from .reading import joints as joints

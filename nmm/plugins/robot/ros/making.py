@@ -118,11 +118,15 @@ class Messages:
             twist=self._made(kinds[1], twist=self._twist(velocity), covariance=covariances[1]),
         )
 
-    def transforms(self, t: float, q: ArrayLike) -> Any:
-        """A TFMessage at t, s: the base in odom at q (n,)."""
+    def transforms(self, t: float, q: ArrayLike, map_to_odom: ArrayLike | None = None) -> Any:
+        """A TFMessage at t, s: the base in odom at q (n,), and odom in map at a pose (3,) where it is given
+        (`PoseFilter.map_to_odom`; q has `PoseFilter.odom` then)."""
         q = self.robot.q(q)
         at = planar_pose(q[:3] if self._first else np.zeros(3))
-        return self.tf([(t, self.odom, self.base, *at)])
+        edges = [(t, self.odom, self.base, *at)]
+        if map_to_odom is not None:
+            edges.insert(0, (t, "map", self.odom, *planar_pose(vector(map_to_odom, 3, "map_to_odom"))))
+        return self.tf(edges)
 
     def tf(self, found: Sequence[tuple[float, str, str, Array, Array]]) -> Any:
         """A TFMessage of (t, frame, child, position (3,), quaternion (4,) x y z w)."""

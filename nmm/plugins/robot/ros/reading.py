@@ -139,6 +139,30 @@ def base(message: Any, frame: str | None = None, child: str | None = None) -> Ar
     return planar(placement(message), where)
 
 
+def base_covariance(message: Any) -> Array:
+    """(3, 3) of x, y, theta, m and rad, in the axes of the header's frame, for `PoseFilter.fix`: of a
+    PoseWithCovariance, PoseWithCovarianceStamped or Odometry.
+
+    Raises
+    ------
+    InputError : no covariance of 36 finite numbers; one that begins with -1, which is not known
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace as M
+    >>> nmm.ros.base_covariance(M(pose=M(covariance=np.eye(6).ravel())))[2]
+    array([0., 0., 1.])
+    """
+    where, part = f"{name_of(message)}: covariance", message
+    while getattr(part, "covariance", None) is None and getattr(part, "pose", None) is not None:
+        part = part.pose
+    numbers = getattr(part, "covariance", None)
+    expect(numbers is not None, where, "a message with a covariance", None)
+    full = vector(np.asarray(numbers, dtype=np.float64), 36, where).reshape(6, 6)
+    expect(full[0, 0] >= 0.0, where, "one that is known", "-1")
+    return full[np.ix_([0, 1, 5], [0, 1, 5])]
+
+
 def planar(pose: Array, where: str) -> Array:
     """x, y, theta of a pose (4, 4)."""
     leans = math.acos(min(1.0, max(-1.0, float(pose[2, 2]))))

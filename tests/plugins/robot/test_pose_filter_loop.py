@@ -1,0 +1,128 @@
+"""`nmm.PoseFilter` in a robot's loop, and by ROS 2's messages."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from types import SimpleNamespace as Message
+
+import numpy as np
+import pytest
+from places import ROOT
+from planar_poses import matrix_of
+
+import nmm
+from nmm.base.errors import InputError
+
+Array = np.ndarray
+
+
+def test_a_loop_does_its_task_where_the_filter_says_that_the_robot_is() -> None:
+    """A robot that is elsewhere than it is believed at first, and whose left wheel slips by 3 %: fixes 60 ms
+    late at 10 Hz bring its hand to the target, where encoders alone leave it beside. `write` moves it."""
+    robot = nmm.load("unicycle_2r", platform="differential")
+    start, target, rng = robot.q({"q1": 0.3, "q2": 0.9}), np.array([2.0, 0.5]), np.random.default_rng(8)
+
+    def drive_loop(with_fixes: bool) -> float:
+        q, clock = start + np.array([0.1, -0.05, 0.1, 0.0, 0.0]), [0.0]
+        read = dict.fromkeys([*robot.wheel_speeds(np.zeros(2)), "q1", "q2"], 0.0) | {"q1": 0.3, "q2": 0.9}
+        pose_filter = nmm.PoseFilter(
+            robot, start, read, -0.01, covariance=np.diag([0.01, 0.01, 0.02]), spread=1e-4,
+            slip_noise=(0.02, 0.01, 0.05), scale_deviation=0.03,
+        )  # fmt: skip
+        task = nmm.Task(nmm.Position("ee", "xy"), target, gain=1.0)
+        controller = nmm.Controller(robot, task, nmm.DampedLeastSquares(alpha=1), dt=0.01)
+        loop, seen = nmm.Loop(controller, jump=(0.3, 0.3)), []
+
+        def measure() -> tuple[Array, float]:
+            t = clock[0]
+            seen.append((t, q[:3] + 0.01 * rng.standard_normal(3)))
+            q_believed = pose_filter.update(read, t)
+            if with_fixes and len(seen) % 10 == 0:
+                was, pose = seen[-6 if len(seen) > 6 else 0]
+                pose_filter.fix(pose, 1e-4 * np.eye(3), was)
+                q_believed = pose_filter.q
+            return q_believed, t
+
+        def write(u: Array) -> None:
+            nonlocal q
+            speeds = robot.wheel_speeds(u, q)
+            true = robot.platform_inputs(
+                {name: v * (0.97 if "left" in name else 1.0) for name, v in speeds.items()}, q
+            )
+            q = q + 0.01 * robot.S(q) @ np.concatenate([true, u[2:]])
+            for name, v in speeds.items():
+                read[name] += 0.01 * v
+            read["q1"], read["q2"] = q[3:]
+
+        def sleep(seconds: float) -> None:
+            clock[0] += seconds
+
+        loop.run(measure, write, duration=8.0, clock=lambda: clock[0], sleep=sleep)
+        assert not loop.refused
+        return float(np.linalg.norm(nmm.Configuration(robot, q).placement("ee").translation[:2] - target))
+
+    assert drive_loop(True) < 0.03
+    assert drive_loop(False) > 0.1
+
+
+def test_it_runs_as_plain_python_to_the_same_numbers() -> None:
+    script = (
+        "import sys; sys.path[:0] = sys.argv[1:]\n"
+        "from test_pose_filter import drive, fixes_of\n"
+        "one, _, odom = drive(fixes_of([0.3, 0.0, 0.4, 0.2, 0.05, 0.6, 0.0, 0.39]))\n"
+        "print([float(x) for x in [*one.pose, *one.state_covariance.ravel(), *odom.ravel()]])"
+    )
+    paths = [str(ROOT / "tests" / part) for part in ("plugins/robot", "helpers")]
+    plain, compiled = (
+        subprocess.run(
+            [sys.executable, "-c", script, *paths],
+            env=os.environ | {"NUMBA_DISABLE_JIT": disabled},
+            capture_output=True, text=True, check=True,
+        ).stdout
+        for disabled in ("1", "0")
+    )  # fmt: skip
+    np.testing.assert_allclose(json.loads(plain), json.loads(compiled), rtol=0, atol=1e-12)
+
+
+def test_a_filter_speaks_in_messages_with_its_frames_apart() -> None:
+    """A PoseWithCovarianceStamped is a fix; map → odom → base chain to where the filter has the robot."""
+    typesys = pytest.importorskip("rosbags.typesys")
+    robot = nmm.load("differential_base")
+    names = ("left_wheel_joint", "right_wheel_joint")
+    still = dict.fromkeys(names, 0.0)
+    one = nmm.PoseFilter(robot, robot.rest, still, 0.0, covariance=np.diag([0.1, 0.1, 0.1]), spread=1e-3)
+    one.update(dict(zip(names, (3.0, 5.0), strict=True)), 1.0)
+    covariance = np.arange(1.0, 37.0).reshape(6, 6)
+    covariance[np.ix_([0, 1, 5], [0, 1, 5])] = np.diag([0.02, 0.03, 0.04])
+    pose = Message(
+        position=Message(x=0.5, y=0.1, z=0.0),
+        orientation=Message(x=0.0, y=0.0, z=np.sin(0.2), w=np.cos(0.2)),
+    )
+    message = Message(pose=Message(pose=pose, covariance=covariance.ravel()))
+    np.testing.assert_array_equal(nmm.ros.base_covariance(message), np.diag([0.02, 0.03, 0.04]))
+    assert one.fix(nmm.ros.base(message), nmm.ros.base_covariance(message), 1.0) == "used"
+    messages = nmm.ros.Messages(robot, typesys.get_typestore(typesys.Stores.ROS2_JAZZY).types)
+    q = one.q
+    q[:3] = one.odom
+    transforms = nmm.ros.Transforms()
+    transforms.add(messages.transforms(1.0, q, one.map_to_odom))
+    in_map, in_odom = (transforms.base(frame, robot) for frame in ("map", "odom"))
+    np.testing.assert_allclose(matrix_of(in_map), matrix_of(one.pose), atol=1e-12)
+    np.testing.assert_allclose(matrix_of(in_odom), matrix_of(one.odom), atol=1e-12)
+    assert np.abs(in_map - in_odom).max() > 0.01
+
+
+def test_a_covariance_that_is_not_known_is_no_fix() -> None:
+    unknown = np.zeros(36)
+    unknown[0] = -1.0
+    for message, expected in (
+        (Message(pose=Message(covariance=unknown)), "one that is known"),
+        (Message(pose=Message()), "a message with a covariance"),
+        (Message(covariance=np.zeros(9)), "36 numbers"),
+    ):
+        with pytest.raises(InputError) as caught:
+            nmm.ros.base_covariance(message)
+        assert caught.value.expected == expected
