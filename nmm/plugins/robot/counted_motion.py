@@ -74,7 +74,7 @@ def counted_motion(
 
     up (p,) : the inputs, for a unit of time; twist (3,) : their mean along the platform's axes on the way,
     whose exponential is the motion; slopes (3, k) : the twist's derivative in `turned`. Returns how regular
-    the counters' rows are, 0 where they do not determine the inputs.
+    the counters' rows are, 0 where they do not determine the inputs: the twist is NaN then.
 
     Inputs are taken as constant, so the error is of the fifth power of the step, and none where the own
     joints stand still. Source: S. Blanes, F. Casas, J. A. Oteo, J. Ros, The Magnus expansion, Physics Reports
@@ -109,6 +109,8 @@ def counted_motion(
                 remaining[i] -= 0.5 * (C[i, j] + other_C[i, j]) * up[j]
     regular = orthonormal_rows(J, scales, order, L, Q)
     if count > 0 and not regular > 0.0:
+        for i in range(3):
+            twist[i] = math.nan
         return 0.0
     pseudoinverse_transposed(order, L, Q, X)
     for row in range(count):

@@ -150,8 +150,8 @@ def take_part(
 
 @compiled
 def advance(integers: Integers, floats: Array, t: float, by: Array, ahead: Array, rate: float) -> bool:
-    """A new step until t, s, with the fixes that waited for it; False, and none, for numbers that are not
-    finite."""
+    """A new step until t, s, with the fixes that waited for it; False, and nothing is changed, for numbers
+    that are not finite, or lead to such."""
     for c in range(by.shape[0]):
         if not math.isfinite(by[c]):
             return False
@@ -165,7 +165,16 @@ def advance(integers: Integers, floats: Array, t: float, by: Array, ahead: Array
     steps.start[k], steps.end[k], steps.rate[k] = steps.end[previous], t, rate
     copied(by, steps.by[k])
     copied(ahead, steps.ahead[k])
-    take_step(history, k, previous, history.odom)
+    odom = scratch(3)
+    copied(history.odom, odom)
+    take_step(history, k, previous, odom)
+    for i in range(steps.x.shape[1]):
+        if not (math.isfinite(steps.x[k, i]) and math.isfinite(steps.P[k, i, i])):
+            for fix in range(history.fixes.t.shape[0]):
+                if history.fixes.t[fix] > steps.end[previous]:
+                    history.fixes.outcome[fix] = WAITING
+            return False
+    copied(odom, history.odom)
     history.newest[()] = k
     history.stored[()] = min(history.stored[()] + 1, steps.end.shape[0])
     return True

@@ -194,7 +194,8 @@ class PoseFilter:
             expected = f"{self._still.size} counters and {steps.ahead.shape[1]} joints"
             raise InputError(where=f"{self._where}: step", expected=expected, got=(by, joints))
         if not self._advance(*self._blocks, t, by, joints, math.nan if yaw_rate is None else yaw_rate):
-            raise InputError(where=f"{self._where}: step", expected="finite numbers", got=(by, joints))
+            expected = "finite numbers, of counters that determine the inputs"
+            raise InputError(where=f"{self._where}: step", expected=expected, got=(by, joints))
 
     def _check_step(self, t: float, yaw_rate: float | None) -> None:
         if not self.t < t < math.inf:

@@ -334,12 +334,14 @@ def test_a_step_and_a_fix_allocate_nothing_that_stays() -> None:
 def test_bad_input_is_named_and_changes_nothing() -> None:
     pose_filter = make(spread=1e-4)
     pose_filter.step(0.1, [0.1, 0.1])
-    before, P = pose_filter.pose, pose_filter.state_covariance
+    before, P, odom = pose_filter.pose, pose_filter.state_covariance, pose_filter.odom
+    assert pose_filter.fix([0.0, 0.0], np.eye(2), 0.15) == "waiting"
     definite = "a symmetric matrix, positive definite"
     cases: list[tuple[Any, str]] = [
         (lambda: pose_filter.step(0.1, [0.1, 0.1]), "a time after 0.1 s"),
         (lambda: pose_filter.step(math.nan, [0.1, 0.1]), "a time after 0.1 s"),
         (lambda: pose_filter.step(0.2, [0.1, math.nan]), "finite numbers"),
+        (lambda: pose_filter.step(0.2, [1e308, -1e308]), "finite numbers"),
         (lambda: pose_filter.step(0.2, [0.1]), "2 counters and 0 joints"),
         (lambda: pose_filter.step(0.2, [0.1, 0.1], yaw_rate=0.1), "a filter with gyro_noise"),
         (lambda: pose_filter.update({"left_wheel_joint": 0.1}, 0.2), ""),
@@ -365,4 +367,7 @@ def test_bad_input_is_named_and_changes_nothing() -> None:
         assert len(str(caught.value)) <= 300
     np.testing.assert_array_equal(pose_filter.pose, before)
     np.testing.assert_array_equal(pose_filter.state_covariance, P)
+    np.testing.assert_array_equal(pose_filter.odom, odom)
     assert pose_filter.t == 0.1
+    pose_filter.step(0.2, [0.1, 0.1])  # the fix that waited is taken
+    assert (np.diag(pose_filter.state_covariance)[:2] < np.diag(P)[:2]).all()
