@@ -30,9 +30,9 @@ def log(T: Array) -> Array:
 def difference(f: Callable[[Array], Array], at: Array, h: float = 1e-5) -> Array:
     """The derivative of f at a point by central differences of fourth order."""
     columns = []
-    for one in np.eye(len(at)):
-        near = (f(at + h * one) - f(at - h * one)) / (2 * h)
-        far = (f(at + 2 * h * one) - f(at - 2 * h * one)) / (4 * h)
+    for axis in np.eye(len(at)):
+        near = (f(at + h * axis) - f(at - h * axis)) / (2 * h)
+        far = (f(at + 2 * h * axis) - f(at - 2 * h * axis)) / (4 * h)
         columns.append((4 * near - far) / 3)
     return np.array(columns).T
 

@@ -118,18 +118,24 @@ def steered_wheels(robot: Robot) -> dict[str, tuple[str, Callable[[float], float
     for wheel in robot.wheels:
         if wheel.swivel and wheel.joint in rows:
             row = rows[wheel.joint]
-            swivels[wheel.swivel] = robot.q_names[int(row[4])], partial(_steering, robot, wheel, row)
+            swivels[wheel.swivel] = (
+                robot.q_names[int(row[4])],
+                partial(_steering, *_swivel(robot, wheel), row),
+            )
     return swivels
 
 
-def _steering(robot: Robot, wheel: Wheel, row: Array, angle: float) -> float:
-    """δ of tan φ = a sin δ / (cos δ - b sin δ) at the swivel's angle, whose axis may point down."""
+def _swivel(robot: Robot, wheel: Wheel) -> tuple[float, float]:
+    """Whether a wheel's swivel turns about what points up, 1 or -1, and its angle where δ is none, rad."""
     model = robot.display_model
     joint = model.getJointId(wheel.swivel)
     upright = (model.jointPlacements[joint].rotation @ twist(model.joints[joint], pin.neutral(model))[1])[2]
-    phi = math.copysign(1.0, upright) * angle + math.remainder(
-        math.atan2(-wheel.axis[0], wheel.axis[1]), math.pi
-    )
+    return math.copysign(1.0, upright), math.remainder(math.atan2(-wheel.axis[0], wheel.axis[1]), math.pi)
+
+
+def _steering(upright: float, straight: float, row: Array, angle: float) -> float:
+    """δ of tan φ = a sin δ / (cos δ - b sin δ) at the swivel's angle."""
+    phi = upright * angle + straight
     return math.atan2(math.sin(phi), row[7] * math.cos(phi) + row[8] * math.sin(phi))
 
 

@@ -6,8 +6,9 @@ import math
 from typing import NamedTuple
 
 from nmm.base.arrays import Array, Integers
-from nmm.base.kernels.compiled import call_platform, clear, compiled, integer_scratch, scratch
+from nmm.base.kernels.compiled import call_platform, clear, compiled, integer_scratch, scratch, view
 from nmm.base.kernels.linear_algebra import orthonormal_rows, pseudoinverse_transposed
+from nmm.base.kernels.planar_motions import compose_planar, exp_planar, to_body_axes
 from nmm.base.kernels.record_layout import IntegerVector, Matrix, Vector, views
 from nmm.base.kernels.signatures import float64, int64, void
 from nmm.model.robots.wheel_rates import rolling
@@ -150,20 +151,57 @@ def inputs_of_record(integers: Integers, floats: Array, own: Array, C: Array, B:
 
 
 @compiled
-def motion_of_record(
+def move_by_record(
     integers: Integers,
     floats: Array,
-    own: Array,
+    q: Array,
     ahead: Array,
-    turned: Array,
+    by: Array,
+    shares: Array,
+    spread: Array,
     up: Array,
-    twist: Array,
-    slopes: Array,
+    P: Array,
 ) -> float:
-    """`counted_motion` of the record at the blocks' beginning."""
-    return counted_motion(views(Counted, integers, floats, 0), own, ahead, turned, up, twist, slopes)
+    """A step of odometry by the record at the blocks' beginning: the platform goes from q (n,) to the first
+    three of `ahead` (n,), whose own joints are measured; its covariance P (3, 3) goes on.
+
+    by, shares, spread (k,) : how far the counters went, the share of it that moves the platform, and its
+    variance for each radian or m; up (at least p,) : the inputs. Returns as `counted_motion`.
+    """
+    counted = views(Counted, integers, floats, 0)
+    joints, k = counted.coordinates - 3, by.shape[0]
+    turned, twist, slopes = scratch(k), scratch(3), scratch((3, k))
+    way, slope, noise, rows = scratch(3), scratch((3, 3)), scratch((3, k)), scratch((3, 3))
+    for c in range(k):
+        turned[c] = shares[c] * by[c]
+    inputs = view(up, 0, (counted.steered.shape[0],))
+    regular = counted_motion(
+        counted, view(q, 3, (joints,)), view(ahead, 3, (joints,)), turned, inputs, twist, slopes
+    )
+    exp_planar(twist, way, slope)
+    for i in range(3):
+        ahead[i] = q[i]
+    compose_planar(ahead, way)
+    to_body_axes(-q[2], slope)
+    for i in range(3):
+        for c in range(k):
+            noise[i, c] = 0.0
+            for j in range(3):
+                noise[i, c] += slope[i, j] * slopes[j, c] * shares[c]
+    for j in range(3):  # P = F P F' + noise, F of the turn about where it was
+        rows[0, j] = P[0, j] - (ahead[1] - q[1]) * P[2, j]
+        rows[1, j] = P[1, j] + (ahead[0] - q[0]) * P[2, j]
+        rows[2, j] = P[2, j]
+    for i in range(3):
+        P[i, 0] = rows[i, 0] - (ahead[1] - q[1]) * rows[i, 2]
+        P[i, 1] = rows[i, 1] + (ahead[0] - q[0]) * rows[i, 2]
+        P[i, 2] = rows[i, 2]
+        for j in range(3):
+            for c in range(k):
+                P[i, j] += noise[i, c] * spread[c] * abs(by[c]) * noise[j, c]
+    return regular
 
 
 _FLAT, _ROWS = float64[::1], float64[:, ::1]
 INPUTS = void(int64[::1], _FLAT, _FLAT, _ROWS, _ROWS)
-MOTION = float64(int64[::1], _FLAT, _FLAT, _FLAT, _FLAT, _FLAT, _FLAT, _ROWS)
+MOVE = float64(int64[::1], _FLAT, _FLAT, _FLAT, _FLAT, _FLAT, _FLAT, _FLAT, _ROWS)

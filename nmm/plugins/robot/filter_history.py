@@ -25,7 +25,8 @@ from nmm.base.kernels.record_layout import (
 )
 from nmm.base.kernels.signatures import boolean, float64, int64
 from nmm.plugins.robot.counted_motion import Counted
-from nmm.plugins.robot.filter_step import Noise, correct, predict
+from nmm.plugins.robot.filter_fix import correct
+from nmm.plugins.robot.filter_step import Noise, predict
 
 #: What became of a fix: `pose_filter.OUTCOMES` has the words.
 WAITING, USED, OUTLIER, LATE, EARLY, CROWDED, INVALID = range(7)

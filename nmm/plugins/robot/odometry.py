@@ -11,14 +11,13 @@ from numpy.typing import ArrayLike
 from nmm.base.arrays import Array, matrix, scalar, vector
 from nmm.base.errors import InputError, expect_known, few, no_such
 from nmm.base.kernels.compiled import checked_by_caller
-from nmm.base.kernels.planar_motions import compose_planar, exp_planar
 from nmm.base.kernels.record_layout import Memory
 from nmm.base.text_format import apart
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.wheel_rates import wheel_rates, wheel_shares
 from nmm.model.robots.zero_order_hold import HeldInputs
-from nmm.plugins.robot.counted_motion import INPUTS, MOTION, Counted, inputs_of_record, motion_of_record
-from nmm.plugins.robot.encoders import Turns
+from nmm.plugins.robot.counted_motion import INPUTS, MOVE, Counted, inputs_of_record, move_by_record
+from nmm.plugins.robot.encoders import Encoders, JointReadings, Turns
 
 #: A counter may run so much faster than the fastest, and jump by that, rad or m: stamps are not exact.
 FASTER, JUMPS = 1.5, 0.1
@@ -138,20 +137,23 @@ class Odometry:
         self.shares = self.by_counter(slip, np.ones(len(counted)), "slip")
         limits = {wheel.joint: wheel.velocity for wheel in robot.wheels}
         usual = np.array([limits.get(name, math.inf) for name in counted])
-        self._fastest = self.by_counter(fastest, usual, "fastest")
+        self._fastest = self.by_counter(fastest, usual, "fastest").tolist()
         self._t = math.nan
         #: How far the counters went at the last update (k,), rad or m.
         self.last_counts = np.zeros(len(counted))
-        self._spread = scalar(spread, f"{self._where}: spread", least=0.0)
+        self._spread = np.full(len(counted), scalar(spread, f"{self._where}: spread", least=0.0))
         self.covariance = np.zeros((3, 3))
         if covariance is not None:
             self.covariance = matrix(covariance, (3, 3), f"{self._where}: covariance")
         own = robot.q_names[3 : robot.platform.n_p]
+        self._names: tuple[str, ...] = ()
+        self._up = np.zeros(robot.n_u)
         self._hitches = [name for name in own if robot.coordinate(name) not in self._counters.steered]
         self._held = HeldInputs(robot)
+        self._encoders = Encoders(robot)
         wheels, first = counted_wheels(robot), self._read(encoders)[0]
         self._turns = Turns(self._counters.names, wheels, wrapped, first, self._where)
-        self._move = checked_by_caller(motion_of_record, MOTION)
+        self._move = checked_by_caller(move_by_record, MOVE)
         self._check_determined(self.q[3 : robot.platform.n_p])
 
     @property
@@ -179,47 +181,30 @@ class Odometry:
             then
         """
         readings, ahead = self._read(encoders)
-        most = np.full(len(readings), math.inf)
-        lasted = math.nan
+        most, lasted = [math.inf] * len(readings), math.nan
         if t is not None:
             t = scalar(t, f"{self._where}: t")
             lasted = max(t - self._t, 0.0)
-            with np.errstate(invalid="ignore"):  # infinite in no time
-                most = FASTER * self._fastest * lasted + JUMPS
+            most = [FASTER * rate * lasted + JUMPS for rate in self._fastest]  # infinite * 0 is no number
         counts = self._turns.after(readings, most)
-        by = counts - self._turns.counts
-        for k in np.flatnonzero(np.abs(by) > most)[:1]:
-            what = f"{self._counters.names[k]} jumped: it cannot turn so far in {lasted:.3g} s"
-            _, allowed = apart(float(abs(by[k])), float(most[k]), digits=3)
-            raise InputError(what, where=self._where, expected=f"at most {allowed}", got=float(by[k]))
-        robot, n_p = self.robot, self.robot.platform.n_p
-        before, after = self.q[3:n_p].copy(), ahead[3:n_p].copy()
-        up, twist, slopes = np.zeros(robot.platform.p), np.zeros(3), np.zeros((3, len(by)))
-        if (
-            self._move(*self._counters.blocks, before, after, self.shares * by, up, twist, slopes)
-            < DETERMINED
-        ):
-            self._check_determined(0.5 * (before + after))
-        way, slope, pose = np.zeros(3), np.zeros((3, 3)), self.q[:3].copy()
-        exp_planar(twist, way, slope)
-        compose_planar(pose, way)
-        unmeasured = [name for name in self._hitches if name not in encoders]
-        if unmeasured:
-            u = np.concatenate([up, np.zeros(robot.n_u - robot.platform.p)])
-            rolled = self._held(self.q, u, 1.0)
-            for name in unmeasured:
-                ahead[robot.coordinate(name)] = rolled[robot.coordinate(name)]
-        ahead[:3] = pose
-        if self._spread or self.covariance.any():
-            c, s = math.cos(self.q[2]), math.sin(self.q[2])
-            turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-            carried = np.eye(3)
-            carried[:2, 2] = self.q[1] - pose[1], pose[0] - self.q[0]
-            noise = turn @ slope @ slopes * self.shares
-            added = noise * (self._spread * np.abs(by)) @ noise.T
-            self.covariance = carried @ self.covariance @ carried.T + added
+        by = [count - before for count, before in zip(counts, self._turns.counts, strict=True)]
+        for k, way in enumerate(by):
+            if abs(way) > most[k]:
+                what = f"{self._counters.names[k]} jumped: it cannot turn so far in {lasted:.3g} s"
+                _, allowed = apart(abs(way), most[k], digits=3)
+                raise InputError(what, where=self._where, expected=f"at most {allowed}", got=way)
+        self.last_counts[:] = by
+        q, n_p = self.q, self.robot.platform.n_p
+        P = self.covariance.copy()
+        blocks, noise, up = self._counters.blocks, self._spread, self._up
+        if self._move(*blocks, q, ahead, self.last_counts, self.shares, noise, up, P) < DETERMINED:
+            self._check_determined(0.5 * (q[3:n_p] + ahead[3:n_p]))
+        if self._unmeasured:
+            rolled = self._held(q, up, 1.0)
+            for i in self._unmeasured:
+                ahead[i] = rolled[i]
+        self.covariance = P
         self._turns.take(readings, counts)
-        self.last_counts = by
         self.q = ahead
         self._t = math.nan if t is None else t
         return ahead.copy()
@@ -252,18 +237,29 @@ class Odometry:
         q[:3] = x, y, q[2] + math.remainder(theta - q[2], 2.0 * math.pi)
         self.q, self.covariance = q, new
 
-    def _read(self, encoders: Mapping[str, float]) -> tuple[Array, Array]:
+    def _read(self, encoders: Mapping[str, float]) -> tuple[list[float], Array]:
         """The counters' readings, and q with the joints where they are measured."""
-        names, inputs = self._counters.names, self.robot.platform.inputs
-        absent = [name for name in names if name not in encoders]
+        names = tuple(encoders)
+        if names != self._names:
+            self._name(names)
+        values = [*encoders.values()]
+        for i, value in enumerate(values):
+            if not (isinstance(value, float) and math.isfinite(value)):
+                values[i] = scalar(value, f"{self._where}: {names[i]}")
+        q = self.q.copy()
+        self._joints.write(values, q, self.q)
+        return [float(values[i]) for i in self._places], q
+
+    def _name(self, names: tuple[str, ...]) -> None:
+        """Find where readings by these names, in this order, belong."""
+        counters, robot = self._counters.names, self.robot
+        absent = [name for name in counters if name not in names]
         if absent:
-            raise InputError(f"no reading of {few(absent)}", where=self._where, got=[*encoders])
-        counts = np.array([scalar(encoders[name], f"{self._where}: {name}") for name in names])
-        joints = {name: value for name, value in encoders.items() if name not in inputs}
-        rest = {name: self.q[self.robot.coordinate(name)] for name in self._hitches if name not in joints}
-        signs = dict.fromkeys(self.robot.reversed_joints, -1.0)
-        rest = {name: signs.get(name, 1.0) * value for name, value in rest.items()}
-        return counts, self.robot.q_from({**joints, **rest}, self.q[:3], self.q)
+            raise InputError(f"no reading of {few(absent)}", where=self._where, got=[*names])
+        self._joints = JointReadings(self._encoders, names, robot.platform.inputs, self._hitches)
+        self._places = [names.index(name) for name in counters]
+        self._unmeasured = [robot.coordinate(name) for name in self._hitches if name not in names]
+        self._names = names
 
 
 def wheel_speeds(robot: Robot, u: ArrayLike, q: ArrayLike | None = None) -> dict[str, float]:

@@ -14,6 +14,7 @@ from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.record_layout import views
 from nmm.model.robots.robot import Robot
 from nmm.plugins.robot import filter_history as rings
+from nmm.plugins.robot.filter_checks import covariance_of, float_array, gates_of, turned_axes
 from nmm.plugins.robot.filter_step import Noise
 from nmm.plugins.robot.odometry import Odometry
 
@@ -123,7 +124,7 @@ class PoseFilter:
         places = counted(fixes, f"{where}: fixes")
         gates = np.full(2, np.inf)
         if gate is not None:
-            gates[:] = _gates(scalar(gate, f"{where}: gate", above=0.0, below=1.0))
+            gates[:] = gates_of(scalar(gate, f"{where}: gate", above=0.0, below=1.0))
         self._joints = self._odometry.q
         noise = Noise(self._odometry.shares, variances, slips**2, np.array([gyro, walk, drift]) ** 2)
         sizes = steps, places, d
@@ -142,15 +143,9 @@ class PoseFilter:
         """Begin at t with a pose (3,), of covariance (3, 3), and else with x (d,) and P (d, d)."""
         steps = self._history.steps
         x[:3] = vector(pose, 3, f"{self._where}: pose")
-        wanted = "a covariance: symmetric, no negative variance"
-        given = matrix(covariance, (3, 3), f"{self._where}: covariance")
-        size = float(np.abs(given).max())
-        definite = np.allclose(given, given.T, rtol=0.0, atol=1e-9 * size)
-        definite &= bool(np.linalg.eigvalsh(given).min() >= -1e-9 * size)
-        expect(definite, f"{self._where}: covariance", wanted, given)
-        turn = _turn(x[2])
+        turn = turned_axes(x[2])
         P[:3] = P[:, :3] = 0.0
-        P[:3, :3] = turn.T @ given @ turn
+        P[:3, :3] = turn.T @ covariance_of(covariance, f"{self._where}: covariance") @ turn
         steps.end[0], steps.ahead[0] = np.nextafter(t, -np.inf), self._joints[3 : self.robot.platform.n_p]
         steps.x[0], steps.P[0] = x, P
         self._history.newest[()], self._history.stored[()], self._history.fixed[()] = 0, 1, 0
@@ -169,9 +164,9 @@ class PoseFilter:
         ------
         InputError : as of `Odometry.update`, and of `step`; nothing is changed then
         """
-        self._check_step(t, yaw_rate)
+        t = self._check_step(t, yaw_rate)
         self._joints = self._odometry.update(encoders, t)
-        self.step(t, self._odometry.last_counts, self._joints[3 : self.robot.platform.n_p], yaw_rate)
+        self._take(t, self._odometry.last_counts, self._joints[3 : self.robot.platform.n_p], yaw_rate)
         return self.q
 
     def step(
@@ -185,7 +180,7 @@ class PoseFilter:
         InputError : t is not later than before, other lengths, numbers that are not finite; nothing is
             changed then
         """
-        self._check_step(t, yaw_rate)
+        t = self._check_step(t, yaw_rate)
         steps = self._history.steps
         by = np.ascontiguousarray(by, dtype=np.float64)
         joints = steps.ahead[self._history.newest[()]] if own is None else own
@@ -193,16 +188,22 @@ class PoseFilter:
         if by.shape != self._still.shape or joints.shape != steps.ahead[0].shape:
             expected = f"{self._still.size} counters and {steps.ahead.shape[1]} joints"
             raise InputError(where=f"{self._where}: step", expected=expected, got=(by, joints))
-        if not self._advance(*self._blocks, t, by, joints, math.nan if yaw_rate is None else yaw_rate):
-            expected = "finite numbers, of counters that determine the inputs"
-            raise InputError(where=f"{self._where}: step", expected=expected, got=(by, joints))
+        self._take(t, by, joints, yaw_rate)
 
-    def _check_step(self, t: float, yaw_rate: float | None) -> None:
+    def _check_step(self, t: float, yaw_rate: float | None) -> float:
+        if not isinstance(t, float):
+            t = scalar(t, f"{self._where}: t")
         if not self.t < t < math.inf:
             raise InputError(where=f"{self._where}: t", expected=f"a time after {self.t:g} s", got=t)
         if yaw_rate is not None and not (self._has_gyro and math.isfinite(yaw_rate)):
             expected = "a finite number" if self._has_gyro else "a filter with gyro_noise"
             raise InputError(where=f"{self._where}: yaw_rate", expected=expected, got=yaw_rate)
+        return t
+
+    def _take(self, t: float, by: Array, joints: Array, yaw_rate: float | None) -> None:
+        if not self._advance(*self._blocks, t, by, joints, math.nan if yaw_rate is None else yaw_rate):
+            expected = "finite numbers, of counters that determine the inputs"
+            raise InputError(where=f"{self._where}: step", expected=expected, got=(by, joints))
 
     def fix(self, pose: ArrayLike, covariance: ArrayLike, t: float, at: ArrayLike = (0.0, 0.0)) -> str:
         """Take a fix in the map: x, y, theta or x, y alone, m and rad.
@@ -223,7 +224,7 @@ class PoseFilter:
         ------
         InputError : other shapes, numbers that are not finite, a matrix that is no covariance
         """
-        y, R, lever = map(_numbers, (pose, covariance, at))
+        y, R, lever = map(float_array, (pose, covariance, at))
         where = f"{self._where}: fix"
         shaped = y.shape in _POSES and R.shape == (y.size, y.size) and lever.shape == (2,)
         if not (shaped and isinstance(t, float)):
@@ -271,7 +272,7 @@ class PoseFilter:
     @property
     def covariance(self) -> Array:
         """(3, 3) of x, y, theta in the map's axes, m and rad."""
-        turn = _turn(float(self._x[2]))
+        turn = turned_axes(float(self._x[2]))
         return turn @ self._P[:3, :3] @ turn.T
 
     @property
@@ -303,8 +304,8 @@ class PoseFilter:
     def scales(self) -> dict[str, float]:
         """By which each counter's turning is multiplied, beside its `slip`; 1 where they are no part of the
         state."""
-        found = 1.0 + self._x[4:] if len(self._x) > 4 else np.ones(len(self.counters))
-        return dict(zip(self.counters, found.tolist(), strict=True))
+        scales = 1.0 + self._x[4:] if len(self._x) > 4 else np.ones(len(self.counters))
+        return dict(zip(self.counters, scales.tolist(), strict=True))
 
     @property
     def outliers(self) -> int:
@@ -315,30 +316,3 @@ class PoseFilter:
                 break
             count += int(fixes.outcome[place] == rings.OUTLIER)
         return count
-
-
-def _gates(share: float) -> tuple[float, float]:
-    """Below which this share of squares of 2 and of 3 normal numbers lies (SciPy is no part of a robot's
-    install)."""
-    low, high = 0.0, 1e3
-    for _ in range(100):
-        middle = 0.5 * (low + high)
-        beyond = math.erfc(math.sqrt(0.5 * middle)) + math.sqrt(2 * middle / math.pi) * math.exp(
-            -0.5 * middle
-        )
-        low, high = (middle, high) if beyond > 1.0 - share else (low, middle)
-    return -2.0 * math.log1p(-share), middle
-
-
-def _numbers(value: ArrayLike) -> Array:
-    """A float64 array, empty for what is none."""
-    try:
-        return np.ascontiguousarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        return np.zeros(0)
-
-
-def _turn(theta: float) -> Array:
-    """diag(R, 1) from the platform's axes to the map's."""
-    c, s = math.cos(theta), math.sin(theta)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

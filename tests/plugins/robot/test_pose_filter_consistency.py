@@ -59,7 +59,9 @@ class Extended:
         Q = B @ np.diag(SPREAD * np.abs(counts)) @ B.T
         Q += np.diag(SLIP**2 * [twist[0, 0], twist[0, 0], abs(twist[0, 2])])
         h = 1e-6
-        D = np.array([(moved(twist + h * one) - moved(twist - h * one))[0] / (2 * h) for one in np.eye(3)]).T
+        D = np.array(
+            [(moved(twist + h * axis) - moved(twist - h * axis))[0] / (2 * h) for axis in np.eye(3)]
+        ).T
         way = turned(self.x[:, 2], np.repeat(moved(twist), RUNS, 0))
         F, turn = np.repeat(np.eye(3)[None], RUNS, 0), np.repeat(np.eye(3)[None], RUNS, 0)
         F[:, 0, 2], F[:, 1, 2] = -way[:, 1], way[:, 0]
@@ -119,16 +121,18 @@ def means(name: str) -> tuple[Array, Array]:
             theirs.append(extended.squares(true[k]).mean())
     robot, still = nmm.load("differential_base"), {"left_wheel_joint": 0.0, "right_wheel_joint": 0.0}
     noise: dict[str, Any] = {"spread": SPREAD, "slip_noise": SLIP, "gate": None, "rate": 4 / DT}
-    one = nmm.PoseFilter(robot, robot.rest, still, 0.0, covariance=first, **noise)
+    pose_filter = nmm.PoseFilter(robot, robot.rest, still, 0.0, covariance=first, **noise)
     ours = np.zeros((STEPS // EVERY, RUNS))
     for run in range(RUNS):
-        one.restart(np.zeros(3), first)
+        pose_filter.restart(np.zeros(3), first)
         for k in range(1, STEPS + 1):
-            t = one.t + DT
-            one.step(t, counts[k - 1])
+            t = pose_filter.t + DT
+            pose_filter.step(t, counts[k - 1])
             if k % EVERY == 0:
-                one.fix(fixes[k, run, : setting.rows], R, t)
-                ours[k // EVERY - 1, run] = squared(one.pose, one.state_covariance[:3, :3], true[k, run])
+                pose_filter.fix(fixes[k, run, : setting.rows], R, t)
+                ours[k // EVERY - 1, run] = squared(
+                    pose_filter.pose, pose_filter.state_covariance[:3, :3], true[k, run]
+                )
     return ours.mean(axis=1), np.array(theirs)
 
 

@@ -39,12 +39,12 @@ def test_a_loop_does_its_task_where_the_filter_says_that_the_robot_is() -> None:
         def measure() -> tuple[Array, float]:
             t = clock[0]
             seen.append((t, q[:3] + 0.01 * rng.standard_normal(3)))
-            q_believed = pose_filter.update(read, t)
+            believed = pose_filter.update(read, t)
             if with_fixes and len(seen) % 10 == 0:
                 was, pose = seen[-6 if len(seen) > 6 else 0]
                 pose_filter.fix(pose, 1e-4 * np.eye(3), was)
-                q_believed = pose_filter.q
-            return q_believed, t
+                believed = pose_filter.q
+            return believed, t
 
         def write(u: Array) -> None:
             nonlocal q
@@ -71,9 +71,9 @@ def test_a_loop_does_its_task_where_the_filter_says_that_the_robot_is() -> None:
 def test_it_runs_as_plain_python_to_the_same_numbers() -> None:
     script = (
         "import sys; sys.path[:0] = sys.argv[1:]\n"
-        "from test_pose_filter import drive, fixes_of\n"
-        "one, _, odom = drive(fixes_of([0.3, 0.0, 0.4, 0.2, 0.05, 0.6, 0.0, 0.39]))\n"
-        "print([float(x) for x in [*one.pose, *one.state_covariance.ravel(), *odom.ravel()]])"
+        "from pose_filters import drive, fixes_of\n"
+        "pose_filter, _, odom = drive(fixes_of([0.3, 0.0, 0.4, 0.2, 0.05, 0.6, 0.0, 0.39]))\n"
+        "print([float(x) for x in [*pose_filter.pose, *pose_filter.state_covariance.ravel(), *odom.ravel()]])"
     )
     paths = [str(ROOT / "tests" / part) for part in ("plugins/robot", "helpers")]
     plain, compiled = (
@@ -93,8 +93,10 @@ def test_a_filter_speaks_in_messages_with_its_frames_apart() -> None:
     robot = nmm.load("differential_base")
     names = ("left_wheel_joint", "right_wheel_joint")
     still = dict.fromkeys(names, 0.0)
-    one = nmm.PoseFilter(robot, robot.rest, still, 0.0, covariance=np.diag([0.1, 0.1, 0.1]), spread=1e-3)
-    one.update(dict(zip(names, (3.0, 5.0), strict=True)), 1.0)
+    pose_filter = nmm.PoseFilter(
+        robot, robot.rest, still, 0.0, covariance=np.diag([0.1, 0.1, 0.1]), spread=1e-3
+    )
+    pose_filter.update(dict(zip(names, (3.0, 5.0), strict=True)), 1.0)
     covariance = np.arange(1.0, 37.0).reshape(6, 6)
     covariance[np.ix_([0, 1, 5], [0, 1, 5])] = np.diag([0.02, 0.03, 0.04])
     pose = Message(
@@ -103,15 +105,15 @@ def test_a_filter_speaks_in_messages_with_its_frames_apart() -> None:
     )
     message = Message(pose=Message(pose=pose, covariance=covariance.ravel()))
     np.testing.assert_array_equal(nmm.ros.base_covariance(message), np.diag([0.02, 0.03, 0.04]))
-    assert one.fix(nmm.ros.base(message), nmm.ros.base_covariance(message), 1.0) == "used"
+    assert pose_filter.fix(nmm.ros.base(message), nmm.ros.base_covariance(message), 1.0) == "used"
     messages = nmm.ros.Messages(robot, typesys.get_typestore(typesys.Stores.ROS2_JAZZY).types)
-    q = one.q
-    q[:3] = one.odom
+    q = pose_filter.q
+    q[:3] = pose_filter.odom
     transforms = nmm.ros.Transforms()
-    transforms.add(messages.transforms(1.0, q, one.map_to_odom))
+    transforms.add(messages.transforms(1.0, q, pose_filter.map_to_odom))
     in_map, in_odom = (transforms.base(frame, robot) for frame in ("map", "odom"))
-    np.testing.assert_allclose(matrix_of(in_map), matrix_of(one.pose), atol=1e-12)
-    np.testing.assert_allclose(matrix_of(in_odom), matrix_of(one.odom), atol=1e-12)
+    np.testing.assert_allclose(matrix_of(in_map), matrix_of(pose_filter.pose), atol=1e-12)
+    np.testing.assert_allclose(matrix_of(in_odom), matrix_of(pose_filter.odom), atol=1e-12)
     assert np.abs(in_map - in_odom).max() > 0.01
 
 
