@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -134,10 +134,14 @@ class Odometry:
         self.q = robot.q(q)
         counted = [name for name in encoders if name in (*counted_wheels(robot), *robot.platform.inputs)]
         self._counters = Counters(robot, dict.fromkeys(counted, 0.0), self._where)
-        self.shares = self.by_counter(slip, np.ones(len(counted)), "slip")
+        #: What the step of odometry reads.
+        self.record = self._counters.record
+        where = f"{self._where}: slip"
+        #: Of each counter, the share of its turning that moves the platform (k,).
+        self.shares = by_counter(slip, counted, np.ones(len(counted)), where)
         limits = {wheel.joint: wheel.velocity for wheel in robot.wheels}
         usual = np.array([limits.get(name, math.inf) for name in counted])
-        self._fastest = self.by_counter(fastest, usual, "fastest").tolist()
+        self._fastest = by_counter(fastest, counted, usual, f"{self._where}: fastest").tolist()
         self._t = math.nan
         #: How far the counters went at the last update (k,), rad or m.
         self.last_counts = np.zeros(len(counted))
@@ -160,11 +164,6 @@ class Odometry:
     def counters(self) -> tuple[str, ...]:
         """What counts, by name, in the order of the encoders at first."""
         return self._counters.names
-
-    @property
-    def record(self) -> Counted:
-        """What the step of odometry reads."""
-        return self._counters.record
 
     def update(self, encoders: Mapping[str, float], t: float | None = None) -> Array:
         """q (n,) at these readings, rad or m: of the wheels that were counted at first, and of the joints.
@@ -215,17 +214,6 @@ class Odometry:
         counts = np.zeros(len(self._counters.names))
         self._counters.solved(M, counts, dict.fromkeys(self._counters.steered, 0.0))
 
-    def by_counter(self, given: float | Mapping[str, float] | None, usual: Array, what: str) -> Array:
-        """Numbers (k,), one a counter: the same for all, or by name."""
-        names, where = self._counters.names, f"{self._where}: {what}"
-        if isinstance(given, Mapping):
-            for name, number in given.items():
-                expect_known("wheel", name, names, where)
-                usual[names.index(name)] = scalar(number, f"{where} of {name}")
-        elif given is not None:
-            usual[:] = scalar(given, where)
-        return usual
-
     def correct(self, pose: ArrayLike, covariance: ArrayLike | None = None) -> None:
         """Put the platform at a pose (3,) that was measured, m and rad, with its covariance (3, 3), zero by
         default. Theta is taken nearest to what it was."""
@@ -260,6 +248,19 @@ class Odometry:
         self._places = [names.index(name) for name in counters]
         self._unmeasured = [robot.coordinate(name) for name in self._hitches if name not in names]
         self._names = names
+
+
+def by_counter(
+    value: float | Mapping[str, float] | None, names: Sequence[str], usual: Array, where: str
+) -> Array:
+    """Numbers (k,), one a counter: the same for all, or by name."""
+    if isinstance(value, Mapping):
+        for name, number in value.items():
+            expect_known("wheel", name, names, where)
+            usual[names.index(name)] = scalar(number, f"{where} of {name}")
+    elif value is not None:
+        usual[:] = scalar(value, where)
+    return usual
 
 
 def wheel_speeds(robot: Robot, u: ArrayLike, q: ArrayLike | None = None) -> dict[str, float]:

@@ -16,7 +16,7 @@ from nmm.model.robots.robot import Robot
 from nmm.plugins.robot import filter_history as rings
 from nmm.plugins.robot.filter_checks import covariance_of, float_array, gates_of, turned_axes
 from nmm.plugins.robot.filter_step import Noise
-from nmm.plugins.robot.odometry import Odometry
+from nmm.plugins.robot.odometry import Odometry, by_counter
 
 #: What became of a fix, by the codes of `filter_history`.
 OUTCOMES = ("waiting", "used", "outlier", "late", "early", "crowded")
@@ -110,7 +110,7 @@ class PoseFilter:
         self._odometry = Odometry(robot, q, encoders, slip, fastest=fastest, wrapped=wrapped)
         self.counters = self._odometry.counters
         k = len(self.counters)
-        variances = self._odometry.by_counter(spread, np.zeros(k), "spread")
+        variances = by_counter(spread, self.counters, np.zeros(k), f"{where}: spread")
         expect(bool((variances >= 0.0).all()), f"{where}: spread", "numbers from 0", variances)
         slips = vector(slip_noise, 3, f"{where}: slip_noise")
         self._has_gyro = gyro_noise is not None
