@@ -115,8 +115,8 @@ FAULTS = [
     Fault(LOADING + "joint_kinds.py", "for end in (-upper, -lower)", "for end in (lower, upper)", "model/test_axes_down.py"),
     Fault(LOADING + "extents.py", ".max(axis=0).min()", ".max(axis=0).max()", "model/test_mesh_wheels.py model/test_wheels.py"),
     Fault(LOADING + "packages.py", "file = self._of_mujoco(name) or self._nearby", "file = self._nearby", "model/test_file_elements.py::test_meshes_are_where_mujoco_looks_for_them"),
-    Fault("nmm/plugins/robot/odometry.py", "added = noise * (self._spread * np.abs(by)) @ noise.T", "added = noise * self._spread @ noise.T", "model/test_odometry.py"),
-    Fault("nmm/plugins/robot/odometry.py", "carried[:2, 2] = -step[1], step[0]", "carried[:2, 2] = step[1], step[0]", "model/test_odometry.py"),
+    Fault("nmm/plugins/robot/counted_motion.py", "* spread[c] * abs(by[c]) * noise[j, c]", "* spread[c] * noise[j, c]", "model/test_odometry.py"),
+    Fault("nmm/plugins/robot/counted_motion.py", "rows[0, j] = P[0, j] - (ahead[1]", "rows[0, j] = P[0, j] + (ahead[1]", "model/test_odometry.py"),
 ]  # fmt: skip
 
 
