@@ -132,7 +132,12 @@ def command(function: Callable[..., int | None]) -> Callable[..., int | None]:
                 group(**{field.name: values.pop(field.name) for field in fields(group)}) for group in several
             )
             values[name] = AddedOptions(filled) if name in places else filled[0]
-        return function(**values)
+        if not any(getattr(value, "trust", False) for value in values.values()):
+            return function(**values)
+        from nmm.model.robots.loading.trust import trusting
+
+        with trusting(True):  # of a scenario's robots, too, which no key of a scenario can trust
+            return function(**values)
 
     del whole.__wrapped__
     whole.__signature__ = signature  # type: ignore[attr-defined]  # what typer reads
@@ -175,6 +180,10 @@ class OfRobot:
         "error|skip",
         "What to do about meshes that are not there: refuse the robot, or leave their shapes out.",
         show="the scenario's; skip to look at a robot, else error",
+    )
+    trust: bool = flag(
+        "--trust",
+        "Let xacro files run programs of their authors, and read environment variables and any file.",
     )
 
     def keywords(self) -> dict[str, Any]:

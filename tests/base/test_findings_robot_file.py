@@ -112,6 +112,12 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
         "actuators ask for less than the joints' limits, which are kept: q1 from -1 to 0.5",
     ),
     "xacro_failed": ({"reason": "division by zero"}, {}, "xacro: division by zero"),
+    "xacro_untrusted": (
+        {"what": ".upper of a str"},
+        {"line": 3},
+        "xacro: .upper of a str: expected arithmetic, xacro's functions, the robot's own files; if you trust "
+        "the author: --trust (trust=True)",
+    ),
     "xacro_argument_missing": (
         {"name": "l1"},
         {},

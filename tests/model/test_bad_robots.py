@@ -856,7 +856,11 @@ BAD_XACRO = {
         [("xacro_failed", {})],
         ["Unknown substitution command"],
     ),
-    "environment": (xacro(link("$(env NMM_NOTHING)")), [("xacro_failed", {})], ["NMM_NOTHING"]),
+    "environment": (
+        xacro(link("$(env NMM_NOTHING)")),
+        [("xacro_untrusted", {"what": "environment variable NMM_NOTHING"})],
+        [],
+    ),
     "condition": (xacro('<xacro:if value="maybe"/>'), [("xacro_failed", {})], ["maybe", "not a boolean"]),
     "fatal": (xacro("${xacro.fatal('arm too long')}"), [("xacro_failed", {})], ["arm too long"]),
     "printed": (

@@ -137,6 +137,8 @@ WORDS = placed(
         "only_macros": _only_macros,
         "macro_parameters_missing": _macro_parameters_missing,
         "xacro_failed": "xacro: {reason}",
+        "xacro_untrusted": "xacro: {what}: expected arithmetic, xacro's functions, the robot's own files; if "
+        "you trust the author: --trust (trust=True)",
         "xacro_argument_missing": "xacro argument {name!r} has no default and was not given a value",
         "xacro_endless": "xacro: files or macros too deep in one another (does one include or call itself?)",
         "xacro_warned": "xacro {text}",

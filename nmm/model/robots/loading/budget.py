@@ -3,17 +3,13 @@ any machine has. No known robot comes near a bound."""
 
 from __future__ import annotations
 
-import ast
-import io
 import math
 import re
 import time
-from collections.abc import Iterable, Iterator, Mapping
-from functools import lru_cache, partial
-from pathlib import Path
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial, reduce
 from typing import Any
 
-from nmm.base.files import read_bytes
 from nmm.base.findings import Finding
 
 #: Steps of xacro (an element, a piece of text, a call in an expression, an item of its loops), what a file
@@ -25,15 +21,23 @@ LONGEST, LONGEST_EXPRESSION, LONGEST_YAML, MOST_BITS = 50_000_000, 20_000, 1_000
 MOST_ELEMENTS, MOST_LINKS, MOST_IN_A_ROW, MOST_MOVING = 200_000, 10_000, 1_000, 500
 #: Functions whose integers have as many digits as the argument is large.
 _GROWING = (math.factorial, math.comb, math.perm)
-_QUOTED = re.compile("'[^']*'|\"[^\"]*\"")
+#: Of printf's formats those that say how wide a text is.
+_WIDE = re.compile(r"%(?:\([^)]*\))?[-+ #0]*(?:\*|\d{4}|\d*\.(?:\*|\d{4}))")
 
 
-class BeyondBound(Exception):
+class Refused(Exception):
+    """What a file may not ask for; `text` is where it does, as it stands in the file."""
+
+    def __init__(self, finding: Finding, text: str = "") -> None:
+        self.finding, self.text = finding, text
+        super().__init__(str(finding))
+
+
+class BeyondBound(Refused):
     """A bound, by what it counts."""
 
     def __init__(self, what: str, most: float) -> None:
-        self.finding = Finding("beyond_bound", {"what": what, "most": most})
-        super().__init__(str(self.finding))
+        super().__init__(Finding("beyond_bound", {"what": what, "most": most}))
 
 
 class Budget:
@@ -69,7 +73,16 @@ class Budget:
     def called(self, function: Any, *arguments: Any, **named: Any) -> Any:
         if function in _GROWING and max(map(abs, arguments), default=0) > 1_000:
             raise BeyondBound("bits in an integer", MOST_BITS)
-        return self.took(function(*arguments, **named))
+        if function is sum or function is math.prod:
+            add, first = (self.plus, 0) if function is sum else (self.times, 1)
+            rest = [*arguments[1:], *named.values()]  # where it starts
+            return self.took(reduce(add, self.each(arguments[0]), *(rest or [first])))
+        if function in (map, filter) and arguments and callable(arguments[0]):
+            arguments = (partial(self.called, arguments[0]), *arguments[1:])
+        if callable(named.get("key")):
+            named["key"] = partial(self.called, named["key"])
+        value = self.took(function(*arguments, **named))
+        return self.display(value) if isinstance(value, list | tuple | dict | set) else value
 
     def power(self, base: Any, exponent: Any) -> Any:
         if isinstance(base, int) and isinstance(exponent, int) and base.bit_length() * exponent > MOST_BITS:
@@ -80,7 +93,23 @@ class Budget:
         for value, count in ((left, right), (right, left)):
             if isinstance(value, str | list | tuple) and isinstance(count, int):
                 self.took(range(max(0, len(value) * min(count, LONGEST + 1))))
+                return self.took(self.display(left * right))
         return self.took(left * right)
+
+    def plus(self, left: Any, right: Any) -> Any:
+        value = left + right
+        return self.took(value) if isinstance(value, str | list | tuple) else value
+
+    def modulo(self, left: Any, right: Any) -> Any:
+        if isinstance(left, str) and _WIDE.search(left):
+            raise BeyondBound("characters of a number's width", 999)
+        return left % right
+
+    def display(self, value: Any) -> Any:
+        """A list, tuple, set or mapping: lists of lists double with each, but for what they say."""
+        if _size(value, {}) > LONGEST:
+            raise BeyondBound("characters and items for xacro", LONGEST)
+        return value
 
     def shift(self, value: Any, count: Any) -> Any:
         if isinstance(count, int) and count > MOST_BITS:
@@ -88,86 +117,22 @@ class Budget:
         return self.took(value << count)
 
 
-#: The names under which expressions have a budget's methods; xacro refuses two underscores.
-_NAMES = {name: f"nmm_{name}" for name in ("each", "called", "power", "times", "shift")}
-_OPERATORS: dict[type[ast.operator], str] = {ast.Pow: "power", ast.Mult: "times", ast.LShift: "shift"}
+def _size(value: Any, sizes: dict[int, int]) -> int:
+    """How many characters and items a value would have written out; each of its parts is counted once."""
+    if isinstance(value, str):
+        return len(value)
+    if not isinstance(value, list | tuple | dict | set):
+        return 1
+    if id(value) not in sizes:
+        sizes[id(value)] = 1
+        # Of the type itself: xacro's lists wrap each item anew.
+        parts = [*dict.keys(value), *dict.values(value)] if isinstance(value, dict) else _items(value)
+        sizes[id(value)] = 1 + sum(_size(part, sizes) for part in parts)
+    return sizes[id(value)]
 
 
-class _Counted(ast.NodeTransformer):
-    """An expression that asks a budget before it grows."""
-
-    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
-        self.generic_visit(node)
-        name = _OPERATORS.get(type(node.op))
-        return node if name is None else _call(name, node.left, node.right)
-
-    def visit_Call(self, node: ast.Call) -> ast.expr:
-        self.generic_visit(node)
-        return ast.Call(ast.Name(_NAMES["called"], ast.Load()), [node.func, *node.args], node.keywords)
-
-    def visit_comprehension(self, node: ast.comprehension) -> ast.comprehension:
-        self.generic_visit(node)
-        node.iter = _call("each", node.iter)
-        return node
-
-
-def _call(name: str, *arguments: ast.expr) -> ast.Call:
-    return ast.Call(ast.Name(_NAMES[name], ast.Load()), [*arguments], [])
-
-
-@lru_cache(maxsize=10_000)
-def _compiled(text: str, filename: str, mode: str) -> Any:
-    if len(text) > LONGEST_EXPRESSION:
-        raise BeyondBound("characters in an expression", LONGEST_EXPRESSION)
-    tree = _Counted().visit(ast.parse(text, filename, mode))
-    return compile(ast.fix_missing_locations(tree), filename, mode)
-
-
-def counted_xacro(xacro: Any, budget: Budget) -> list[tuple[Any, str, Any]]:
-    """The replacements, with a budget, of xacro's functions, and of Python's own, which xacro's modules look
-    up after their own names: owner, name and value."""
-    methods = {name: getattr(budget, method) for method, name in _NAMES.items()}
-
-    evaluate_all, evaluate, evaluate_text = xacro.eval_all, xacro.safe_eval, xacro.eval_text
-    parse_parameters = xacro.parse_macro_arg
-
-    def elements(node: Any, macros: Any, symbols: Any) -> None:
-        budget.step()
-        evaluate_all(node, macros, symbols)
-
-    def text(content: Any, symbols: Any) -> Any:
-        if len(content) * content.count("$") > LONGEST:  # xacro copies what is left at each
-            raise BeyondBound("characters and expressions in a text", LONGEST)
-        return budget.took(evaluate_text(content, symbols))
-
-    def parameters(params: str) -> Any:
-        budget.step()
-        if re.search("['\"]", _QUOTED.sub("", params)):  # xacro's pattern would try for ever
-            raise xacro.XacroException("a quote without end in a macro's params")
-        return parse_parameters(params)
-
-    def cloned(node: Any, deep: bool, document: Any) -> Any:
-        budget.step()
-        return clone(node, deep, document)
-
-    minidom = xacro.xml.dom.minidom
-    clone = minidom._clone_node
-    return [
-        (minidom, "_clone_node", cloned),
-        (xacro, "eval_all", elements),
-        (xacro, "eval_text", text),
-        (xacro, "safe_eval", lambda expression, *names: budget.took(evaluate(expression, *names))),
-        (xacro, "parse_macro_arg", parameters),
-        (xacro, "_global_symbols", {**xacro._global_symbols, **methods}),
-        (xacro, "compile", _compiled),
-        (xacro, "open", _yaml_file),
-        (xacro.substitution_args, "eval", partial(_evaluated, methods)),
-    ]
-
-
-def _evaluated(methods: Mapping[str, Any], text: str, _: Any, names: Any) -> Any:
-    return eval(_compiled(text.strip(), "<eval>", "eval"), {**methods}, names)
-
-
-def _yaml_file(name: str) -> io.StringIO:
-    return io.StringIO(read_bytes(Path(name), LONGEST_YAML).decode("utf-8-sig"))
+def _items(value: Any) -> Iterable[Any]:
+    kind: Callable[[Any], Iterable[Any]] = next(
+        one.__iter__ for one in (list, tuple, set) if isinstance(value, one)
+    )
+    return kind(value)

@@ -1,6 +1,6 @@
 """A robot description: the URDF text of a .urdf, .xacro or .xml file, expanded here, and its packages.
 
-A xacro file is a program (`${...}` are Python expressions): load only files that you would run.
+A xacro file is a program (`${...}` are Python expressions): what it may do is in trust.py and expressions.py.
 """
 
 import io
@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
+from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -20,9 +21,11 @@ from nmm.base.errors import RobotError, expect_known
 from nmm.base.findings import Finding
 from nmm.base.findings.robot_file import refusal
 from nmm.base.text_format import listed, one_line
-from nmm.model.robots.loading.budget import STEPS_OF_A_FILE, BeyondBound, Budget, counted_xacro
+from nmm.model.robots.loading.budget import STEPS_OF_A_FILE, Budget, Refused
 from nmm.model.robots.loading.mjcf import Converted, urdf_of
 from nmm.model.robots.loading.packages import Packages
+from nmm.model.robots.loading.trust import check_readable
+from nmm.model.robots.loading.xacro_functions import replacements
 from nmm.model.robots.loading.xml_tree import Element, XmlError, parse, read_text
 
 SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf")
@@ -225,9 +228,8 @@ def _patched(
         return str(folder)
 
     patches = [
-        *counted_xacro(xacro, budget),
-        (xacro, "parse", _reader(xacro, packages.file, budget, call)),
-        (xacro.substitution_args, "_eval_find", find),
+        *replacements(xacro, budget, packages, find),
+        (xacro, "parse", _reader(xacro, packages, budget, call)),
         (xacro, "all_includes", []),
         (xacro, "verbosity", 0),
     ]
@@ -241,13 +243,21 @@ def _patched(
             delattr(owner, name) if value is None else setattr(owner, name, value)
 
 
-def _reader(xacro: Any, main: Path, budget: Budget, call: ElementTree.Element | None) -> Callable[..., Any]:
+def _reader(
+    xacro: Any, packages: Packages, budget: Budget, call: ElementTree.Element | None
+) -> Callable[..., Any]:
     """`xacro.parse`, which reads UTF-8 in any locale and refuses a DOCTYPE before anything is expanded."""
-    original = xacro.parse
+    original, main = xacro.parse, packages.file
 
     def read(text: Any, filename: str | None = None) -> Any:
         if text is not None or filename is None:
             return original(text, filename)
+        if Path(filename) != main:
+            try:
+                check_readable(filename, packages)
+            except Refused:
+                xacro.filestack.pop()  # as above: the error is the including file's
+                raise
         try:
             budget.step(STEPS_OF_A_FILE)
             content = budget.took(read_text(Path(filename)))
@@ -293,14 +303,23 @@ def _inner(path: Path, xacro: Any) -> dict[str, str]:
     return {} if inner is None or Path(inner) == path else {"file": str(inner)}
 
 
+def _place(text: str, path: Path, xacro: Any) -> dict[str, Any]:
+    """The first line of the file that xacro was reading that has the text, as the file would write it."""
+    where: dict[str, Any] = {**_inner(path, xacro)}
+    written = (text, escape(text), escape(text, {'"': "&quot;", "'": "&apos;"}))
+    lines = read_text(Path(where.get("file", path))).splitlines() if text else []
+    line = next((i for i, one in enumerate(lines, 1) if any(form in one for form in written)), None)
+    return where if line is None else {**where, "line": line}
+
+
 def _explained(error: BaseException, path: Path, xacro: Any) -> RobotError:
     """The innermost cause in one line; xacro wraps it once for each expression around it."""
-    while isinstance(getattr(error, "exc", None), xacro.XacroException | RobotError | BeyondBound):
+    while isinstance(getattr(error, "exc", None), xacro.XacroException | RobotError | Refused):
         error = error.exc  # type: ignore[attr-defined]  # XacroException has it, as just asked
     if isinstance(error, RobotError):
         return error
-    if isinstance(error, BeyondBound):
-        return refusal(path, replace(error.finding, where=_inner(path, xacro)))
+    if isinstance(error, Refused):
+        return refusal(path, replace(error.finding, where=_place(error.text, path, xacro)))
     inside = getattr(error, "exc", None)
     code, values = "xacro_failed", {"reason": one_line(str(error)) or type(error).__name__}
     if isinstance(inside, xacro.substitution_args.ArgException):

@@ -24,6 +24,7 @@ from nmm.model.robots.loading.srdf_fitting import (
     with_semantics,
     with_states,
 )
+from nmm.model.robots.loading.trust import trusting
 from nmm.model.robots.robot import Robot
 
 
@@ -43,6 +44,7 @@ def load(
     visual_model: pin.GeometryModel | None = None,
     collision_model: pin.GeometryModel | None = None,
     srdf: str | Path | None = None,
+    trust: bool = False,
 ) -> Robot:
     """Load a mobile manipulator, or an arm that is put on a platform.
 
@@ -81,6 +83,8 @@ def load(
     srdf : a file of postures, groups, joints without a motor and pairs of links that may touch (a xacro file
         gets `arguments`); by default the one beside the file or in ../srdf that has the file's name or the
         robot's
+    trust : whether xacro files may run any Python, and read environment variables and files outside the
+        robot's folder and packages; without, they are refused where they would
 
     Returns
     -------
@@ -107,6 +111,7 @@ def load(
         (name, str, "name", "a string"),
         (limits, Mapping, "limits", "a value for each input's name"),
         (srdf, str | Path, "srdf", "a path"),
+        (trust, bool, "trust", "True or False"),
     ):
         if value is not None and not isinstance(value, kind):
             raise RobotError(where=argument, expected=expected, got=value)
@@ -125,12 +130,14 @@ def load(
         if arguments or folders:
             raise RobotError("they are for files, not for a pin.Model", where="arguments, package_dirs")
         model = read_model(source, visual_model, collision_model)
-        return _with_srdf(model, options, srdf, None, folders)
+        with trusting(trust):
+            return _with_srdf(model, options, srdf, None, folders)
     if visual_model is not None or collision_model is not None:
         what = "they are for a pin.Model: a file holds its own shapes"
         raise RobotError(what, where="visual_model, collision_model")
-    read = read_file(source, arguments, folders, options.lock, missing_meshes)
-    return _with_srdf(read, options, srdf, source_path(source, folders), folders)
+    with trusting(trust):
+        read = read_file(source, arguments, folders, options.lock, missing_meshes)
+        return _with_srdf(read, options, srdf, source_path(source, folders), folders)
 
 
 def _with_srdf(

@@ -46,6 +46,7 @@ class Packages:
         self.searched = (*self.folders, *self.file.parents)
         self.found: dict[str, Path | None] = {}
         self._folders = {name: [folder] for name, folder in absolute if name}
+        self._named = {folder for name, folder in absolute if name}
         self.found.update((name, folder) for name, folder in absolute if name)
 
     def find(self, package: str, asking: Path | None = None) -> Path | None:
@@ -67,6 +68,10 @@ class Packages:
                 self.nearby[package] = self.found[package] = match
                 self._folders[package] = [match]
         return match
+
+    def is_named(self, folder: Path) -> bool:
+        """Whether the caller or the environment names the folder, or one that holds it."""
+        return folder in self._named or any(folder.is_relative_to(one) for one in self.folders)
 
     def mesh(self, name: str) -> Path | Finding:
         """The file of a package://, model://, file://, absolute or relative mesh name; or "mesh_missing"."""

@@ -20,11 +20,17 @@ from nmm.model.robots.loading.load import load
 from nmm.model.robots.loading.locking import limit_notes
 from nmm.model.robots.loading.packages import Packages
 from nmm.model.robots.loading.provenance import acceleration_notes, provenance_of
+from nmm.model.robots.loading.trust import is_trusted, trusting
 from nmm.model.robots.loading.xml_tree import Element, children, link_at
 from nmm.model.robots.meshes import read_meshes
 from nmm.model.robots.robot import Robot
 
 _NOWHERE = "/(package not found)"
+#: What a xacro file was let do, by whether it was trusted.
+_TRUST = {
+    False: "computes only, and reads the robot's own files (a file that needs more is refused: --trust)",
+    True: "trusted: it may run programs, and read any file and the environment",
+}
 
 
 @dataclass(frozen=True)
@@ -55,13 +61,14 @@ def file_report(
     path: str | Path,
     arguments: Mapping[str, object] | None = None,
     package_dirs: Sequence[str | Path] = (),
+    trust: bool = False,
     **options: Any,
 ) -> FileReport:
     """Look at a .urdf, .xacro or .xml file from all sides; every problem is named, not only the first.
 
     Without problems the file was loaded, with what the warnings say: shapes without their meshes left out.
-    arguments, package_dirs and options (platform, lock, wheels, axle, srdf, missing_meshes) are those of
-    `load`; meshes that are not there are problems with missing_meshes "error" and else warnings.
+    arguments, package_dirs, trust and options (platform, lock, wheels, axle, srdf, missing_meshes) are those
+    of `load`; meshes that are not there are problems with missing_meshes "error" and else warnings.
 
     Raises
     ------
@@ -70,13 +77,14 @@ def file_report(
     expect_known("missing_meshes", options.get("missing_meshes", "skip"), ("error", "skip"), error=RobotError)
     file = Path(path).expanduser()
     settings: Mapping[str, Any] = {"arguments": arguments, "package_dirs": package_dirs}
-    try:
-        description = describe(file, **settings)
-    except RobotError as error:
-        if not error.findings:  # what the caller gave is wrong, not what is in the file
-            raise
-        return _unread(file, error.findings, settings)
-    return _report(description, {**settings, **options})
+    with trusting(trust):
+        try:
+            description = describe(file, **settings)
+        except RobotError as error:
+            if not error.findings:  # what the caller gave is wrong, not what is in the file
+                raise
+            return _unread(file, error.findings, settings)
+        return _report(description, {**settings, **options})
 
 
 def _unread(file: Path, findings: tuple[Finding, ...], settings: Mapping[str, Any]) -> FileReport:
@@ -172,6 +180,8 @@ def _facts_of_file(description: Description, root: Element) -> dict[str, str]:
     if description.arguments:
         used = ", ".join(f"{name}={value}" for name, value in description.arguments.items())
         facts["xacro arguments"] = used
+    if description.expanded:
+        facts["xacro"] = _TRUST[is_trusted()]
     facts["links"] = str(len(children(root, "link")))
     facts["joints"] = f"{len(types)}: {kinds}" if kinds else "none"
     return facts
