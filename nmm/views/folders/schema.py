@@ -1,5 +1,6 @@
 """Validation of a folder's JSON and arrays: keys, kinds of values, shapes."""
 
+import math
 import zipfile
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
@@ -152,6 +153,11 @@ def read_arrays(path: Path) -> dict[str, Any]:
         try:
             with zipfile.ZipFile(path) as archive:
                 size, free = sum(info.file_size for info in archive.infolist()), SHARE * free_memory()
+                for info in archive.infolist() if size <= free else ():
+                    name = info.filename
+                    if name.endswith(".npy"):
+                        _expect_its_size(archive, info)
+                name = ""
             if size > free:
                 holds = f"holds {size / 1e9:.3g} GB, and {free / 1e9:.3g} GB of memory may be filled"
                 raise InputError(holds, where=path)
@@ -166,6 +172,18 @@ def read_arrays(path: Path) -> dict[str, Any]:
             damaged = f"{printable(entry)}damaged, or not what nmm wrote: {printable(reason)}"
             raise InputError(damaged, where=path) from None
     return arrays
+
+
+def _expect_its_size(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> None:
+    """`ValueError` for an array whose header claims more than its entry holds: numpy would reserve it all."""
+    with archive.open(info) as entry:
+        version = np.lib.format.read_magic(entry)
+        read = (
+            np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        )
+        shape, _, kind = read(entry)
+        if math.prod(shape) * kind.itemsize > info.file_size:
+            raise ValueError(f"its header claims the shape {shape}, it holds {info.file_size:,} bytes")
 
 
 @contextmanager

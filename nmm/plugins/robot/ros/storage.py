@@ -10,6 +10,13 @@ from typing import Any
 from nmm.base.errors import InputError, RunError
 from nmm.base.files import expect_file
 from nmm.base.findings import Finding
+from nmm.plugins.robot.ros.chunks import (
+    MOST_OF_METADATA,
+    bound_readers,
+    check_claims,
+    claims_of,
+    records_of,
+)
 from nmm.plugins.robot.ros.log import rosbags, typestore
 
 #: A topic and the type of its messages.
@@ -41,6 +48,7 @@ class Log:
         except OSError as error:
             raise InputError(f"cannot be read: {error.strerror}", where=path) from None
         rosbags("rosbag2")
+        bound_readers()
         self._parts = self._opened(path)
         self.topics = [*dict.fromkeys(topic for part in self._parts for topic in part.topics)]
 
@@ -54,11 +62,15 @@ class Log:
 
     def _opened(self, path: Path) -> list[_Indexed | _Streamed]:
         inside = sorted(path.iterdir(), key=_counted) if path.is_dir() else []
+        for file in inside:
+            _expect_readable(file)
         files = [file for file in inside if file.suffix in (".bag", ".mcap", ".db3")]
         whole = not path.is_dir() or (path / "metadata.yaml").exists()
         try:
             if whole:
                 return [_Indexed(path)]
+        except InputError:
+            raise
         except Exception as error:
             if not files and path.suffix != ".mcap":
                 raise _refused(path, error) from None
@@ -92,6 +104,8 @@ class _Indexed:
         self._reader: Callable[[Path], Any] = rosbags("rosbag1" if first else "rosbag2").Reader
         self._decoded = of_ros1() if first else typestore().deserialize_cdr
         with self._reader(path) as bag:
+            for file, claims in claims_of(bag):
+                check_claims(file, claims)
             self.topics = [(connection.topic, connection.msgtype) for connection in bag.connections]
 
     def messages(self, wanted: Collection[Topic]) -> Iterator[Taken]:
@@ -131,7 +145,7 @@ class _Streamed:
         channels: dict[int, tuple[str, str, str]] = {}
         with self.path.open("rb") as file:
             try:
-                for record in stream.StreamReader(file, validate_crcs=True).records:
+                for record in records_of(stream, file, records.Chunk):
                     if isinstance(record, records.Schema):
                         kinds[record.id] = _with_msg(record.name)
                     elif isinstance(record, records.Channel):
@@ -142,6 +156,8 @@ class _Streamed:
                         topic, kind, encoding = channels[record.channel_id]
                         if encoding in self._decoders:
                             yield topic, kind, (encoding, record)
+            except InputError:  # a chunk that is longer than any
+                raise
             except Exception as error:  # of bytes that are cut or are others
                 cut = type(error).__name__ in ("EndOfFile", "error")  # mcap's, and that of struct
                 self.reason = "it lacks its end" if cut else "bytes of it are others than written"
@@ -159,6 +175,16 @@ class _Refusing:
     def __exit__(self, kind: object, error: BaseException | None, _: object) -> None:
         if isinstance(error, Exception) and not isinstance(error, InputError | RunError):
             raise _refused(self._path, error) from None
+
+
+def _expect_readable(file: Path) -> None:
+    """`InputError` for a pipe or a device among a bag's files, and for metadata as long as none are."""
+    try:
+        expect_file(file)
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", where=file) from None
+    if file.name == "metadata.yaml" and (size := file.stat().st_size) > MOST_OF_METADATA:
+        raise InputError(where=file, expected=f"at most {MOST_OF_METADATA:,} bytes", got=size)
 
 
 def _refused(path: Path, error: Exception) -> InputError:

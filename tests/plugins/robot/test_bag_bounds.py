@@ -1,0 +1,95 @@
+"""Logs that claim more than they hold: refused by their sizes, before they fill the memory."""
+
+from __future__ import annotations
+
+import bz2
+import io
+import os
+import struct
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from robot_logs import bag, joints, odom, wheeled
+from rosbags import rosbag2
+
+import nmm
+from nmm.base.errors import InputError
+from nmm.plugins.robot.ros import chunks
+from nmm.views.folders.schema import read_arrays
+
+
+@pytest.mark.parametrize("kind", ["zstd", "lz4", "bz2"])
+def test_chunks_are_decompressed_as_far_as_they_claim(kind: str) -> None:
+    data = b"0" * 100_000
+    if kind == "bz2":
+        packed = bz2.compress(data)
+    else:
+        packed = pytest.importorskip("lz4.frame" if kind == "lz4" else "backports.zstd").compress(data)
+    assert chunks.decompressed(kind, packed, 100_000) == data
+    with pytest.raises(InputError):
+        chunks.decompressed(kind, packed, 99_999)
+    with pytest.raises(InputError, match="lacks its end"):
+        chunks.decompressed(kind, packed[:-3], 200_000)
+
+
+def test_claims_are_bounded_before_anything_is_read(tmp_path: Path) -> None:
+    file = tmp_path / "a.mcap"
+    file.write_bytes(b"0" * 10)
+    chunks.check_claims(file, [chunks.MOST_OF_A_CHUNK] * 20)
+    with pytest.raises(InputError, match="8 GB"):
+        chunks.check_claims(file, [10, 8_000_000_000])
+    with pytest.raises(InputError, match="21 GB"):
+        chunks.check_claims(file, [chunks.MOST_OF_A_CHUNK] * 21)
+
+
+def logged(folder: Path, mcap: bool = True) -> Path:
+    sent = [(0.1 * k, "/joint_states", joints(0.1 * k, {"j1": 0.1, "j2": 0.2})) for k in range(20)]
+    sent += [(0.1 * k, "/odom", odom(0.1 * k, (0.0, 0.0, 0.0))) for k in range(20)]
+    return bag(folder, sent, mcap)
+
+
+@pytest.mark.parametrize("size", [8_000_000_000, 2**63])
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_chunk_that_claims_gigabytes_is_refused(tmp_path: Path, size: int, whole: bool) -> None:
+    folder = logged(tmp_path)
+    (file,) = folder.glob("*.mcap")
+    with rosbag2.Reader(folder) as log:
+        claims = {size for _, sizes in chunks.claims_of(log) for size in sizes}
+    assert claims
+    content = file.read_bytes()
+    for claim in claims:
+        # An uncompressed chunk's length has the same bytes; the claim comes first.
+        content = content.replace(struct.pack("<Q", claim), struct.pack("<Q", size), -1 if whole else 1)
+    file.write_bytes(content if whole else content[:-20])
+    with pytest.raises(InputError, match="chunks of at most 1 GB") as error:
+        nmm.read_bag(folder if whole else file, wheeled(tmp_path))
+    assert len(str(error.value)) <= 300
+
+
+@pytest.mark.parametrize("name", ["metadata.yaml", "more.mcap", "more.db3"])
+def test_pipes_in_a_folder_are_refused(tmp_path: Path, name: str) -> None:
+    folder = logged(tmp_path, mcap=name != "more.db3")
+    (folder / name).unlink(missing_ok=True)
+    os.mkfifo(folder / name)
+    with pytest.raises(InputError, match="a device or a pipe"):
+        nmm.read_bag(folder, wheeled(tmp_path))
+
+
+def test_metadata_of_megabytes_is_refused(tmp_path: Path) -> None:
+    folder = logged(tmp_path)
+    (folder / "metadata.yaml").write_text("#" * (chunks.MOST_OF_METADATA + 1), encoding="utf-8")
+    with pytest.raises(InputError, match=r"metadata\.yaml"):
+        nmm.read_bag(folder, wheeled(tmp_path))
+
+
+def test_an_array_whose_header_claims_more_is_refused(tmp_path: Path) -> None:
+    """numpy would reserve 8 TB, which Linux may grant, before it reads what is there."""
+    made = io.BytesIO()
+    np.lib.format.write_array_header_1_0(made, {"descr": "<f8", "fortran_order": False, "shape": (10**12,)})
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        archive.writestr("t.npy", made.getvalue() + bytes(80))
+    with pytest.raises(InputError, match="its header claims") as error:
+        read_arrays(tmp_path / "a.npz")
+    assert "t" in str(error.value)
