@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_origin, get_type_hints
 
@@ -17,6 +17,7 @@ from nmm.base.errors import InputError, expect_known
 from nmm.base.kinds import PLATFORMS
 from nmm.base.plugins import OptionGroup, complain, groups_of_options
 from nmm.base.text_format import listed
+from nmm.base.trust import trusting
 from nmm.cli.options import (
     AT,
     SUBJECT_SET,
@@ -89,8 +90,9 @@ class PlaceOfOptions:
         return groups
 
 
-def command(function: Callable[..., int | None]) -> Callable[..., int | None]:
-    """The function as typer takes it: options in the place of each parameter that is a group of them.
+def command(function: Callable[..., int | None], opens: bool = False) -> Callable[..., int | None]:
+    """The function as typer takes it: options in the place of each parameter that is a group of them. One
+    that `opens` runs or scenarios has --trust behind its own.
 
     From Python it is called with the options: `redundancy("unicycle_2r", task=["position"])`.
     """
@@ -108,6 +110,7 @@ def command(function: Callable[..., int | None]) -> Callable[..., int | None]:
         for name, own_parameter in own.items()
         for parameter in ([own_parameter] if name not in groups else _options(groups[name]))
     ]
+    parameters += _options([Trust] if opens else [])
     signature = inspect.Signature(
         [
             parameter.replace(
@@ -132,11 +135,8 @@ def command(function: Callable[..., int | None]) -> Callable[..., int | None]:
                 group(**{field.name: values.pop(field.name) for field in fields(group)}) for group in several
             )
             values[name] = AddedOptions(filled) if name in places else filled[0]
-        if not any(getattr(value, "trust", False) for value in values.values()):
-            return function(**values)
-        from nmm.model.robots.loading.trust import trusting
-
-        with trusting(True):  # of a scenario's robots, too, which no key of a scenario can trust
+        trust = values.pop(_TRUST, False) or any(getattr(value, _TRUST, False) for value in values.values())
+        with trusting(trust):  # of a scenario's robots, too, which no key of a scenario can trust
             return function(**values)
 
     del whole.__wrapped__
@@ -163,7 +163,20 @@ def _typed(made: Callable[..., Any]) -> dict[str, inspect.Parameter]:
 
 
 @dataclass(frozen=True)
-class OfRobot:
+class Trust:
+    trust: bool = flag(
+        "--trust",
+        "Let xacro files run programs of their authors, and read environment variables and any file.",
+    )
+
+
+#: Of a command that opens a run or a scenario, and has no options of a robot.
+opening_command = partial(command, opens=True)
+_TRUST = fields(Trust)[0].name
+
+
+@dataclass(frozen=True)
+class OfRobot(Trust):
     """What is made of a robot's joints and meshes, of a scenario's robot too."""
 
     lock: list[str] | None = option(
@@ -180,10 +193,6 @@ class OfRobot:
         "error|skip",
         "What to do about meshes that are not there: refuse the robot, or leave their shapes out.",
         show="the scenario's; skip to look at a robot, else error",
-    )
-    trust: bool = flag(
-        "--trust",
-        "Let xacro files run programs of their authors, and read environment variables and any file.",
     )
 
     def keywords(self) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from nmm.base.errors import InputError, Setting, SingularError, expect
 from nmm.base.files import replaceable
-from nmm.cli.groups import Browser, Figures, Loading, Subject, command
+from nmm.cli.groups import Browser, Figures, Loading, Subject, command, opening_command
 from nmm.cli.interrupts import shielded
 from nmm.cli.options import (
     ResolversOption,
@@ -159,7 +159,7 @@ def _show_self_motion(moved: SelfMotion) -> None:
     say(f"the task stays within {error:.1g} of its value over {trajectory.t[-1]:.3g} s")
 
 
-@command
+@opening_command
 def laps(
     scenario: ScenarioArgument,
     *,

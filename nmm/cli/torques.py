@@ -9,7 +9,7 @@ import typer
 
 from nmm.base.errors import InputError
 from nmm.base.text_format import listed
-from nmm.cli.groups import Figures, command
+from nmm.cli.groups import Figures, opening_command
 from nmm.cli.interrupts import shielded
 from nmm.cli.options import SetOption, flag, option, out_option, values_of
 from nmm.cli.output import OK, progress, show_table, show_text, warn
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from nmm.model.dynamics.torques import Torques
 
 
-@command
+@opening_command
 def torques(
     source: Annotated[
         str, typer.Argument(metavar="RUN|SCENARIO", help="A run's folder; or a scenario, which is run.")

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from nmm.base.errors import ScenarioError, no_such
 from nmm.base.findings import Finding
 from nmm.base.progress import Progress
+from nmm.base.trust import is_trusted, trusting
 from nmm.model.robots.surroundings import Surroundings
 from nmm.scenario.document import Document, read_file
 from nmm.scenario.keys import KeyedError, NamedReferences, as_written, at, first_error
@@ -46,6 +47,7 @@ class Scenario:
     path : the file that it was read from
     parts : its keys, checked
     document : its text as plain data, with what was set
+    trust : whether xacro files of its robots may run any Python
 
     Examples
     --------
@@ -55,8 +57,9 @@ class Scenario:
     (True, 10.0)
     """
 
-    def __init__(self, document: Document) -> None:
+    def __init__(self, document: Document, trust: bool = False) -> None:
         self.document = document
+        self.trust = trust or is_trusted()
         self.path = Path(document.name)
         own_name = re.sub(r"[^\w.-]", "_", self.path.name.split(".", 1)[0]) or "scenario"
         data = {"name": own_name, **document.data}
@@ -80,22 +83,26 @@ class Scenario:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled as its text: the classes of its parts are made at run time, and no import finds them."""
-        return Scenario, (self.document,), {"_own": self._own}
+        return Scenario, (self.document, self.trust), {"_own": self._own}
 
     @classmethod
-    def load(cls, name_or_path: str | Path, overrides: Mapping[str, object] | None = None) -> Scenario:
+    def load(
+        cls, name_or_path: str | Path, overrides: Mapping[str, object] | None = None, *, trust: bool = False
+    ) -> Scenario:
         """Read a scenario.
 
         Parameters
         ----------
         name_or_path : a bundled scenario's name, or a YAML file
         overrides : values by dotted key, as for `override`
+        trust : whether xacro files of its robots may run any Python, as `nmm.load` says; no key of it can
+            say so
 
         Raises
         ------
         ScenarioError : no such scenario; or the file, the line, the key and what was expected there
         """
-        return cls(_with_settings(read_file(_find(name_or_path)), overrides or {}))
+        return cls(_with_settings(read_file(_find(name_or_path)), overrides or {}), trust)
 
     def override(self, key: str, value: object) -> Scenario:
         """This scenario with another value at a dotted key.
@@ -119,7 +126,7 @@ class Scenario:
         ------
         ScenarioError : as `override`
         """
-        derived = Scenario(_with_settings(self.document, settings))
+        derived = Scenario(_with_settings(self.document, settings), self.trust)
         derived._own = self._own
         of_robot = any(key.split(".", 1)[0] == "robot" for key in settings)
         if not of_robot or derived.parts.robot == self.parts.robot:
@@ -149,7 +156,7 @@ class Scenario:
     def robot(self) -> Robot:
         """The robot, loaded once."""
         if self._robot is None:
-            with self._located(), at("robot"):
+            with self._located(), at("robot"), trusting(self.trust):
                 self._robot = self.parts.robot.build()
         return self._robot
 

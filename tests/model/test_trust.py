@@ -1,14 +1,18 @@
 """A stranger's xacro file computes, and reads its own robot's files; only a trusted one runs programs."""
 
+import inspect
+import pickle
 from pathlib import Path
 
 import pytest
+import yaml
 from findings import holds
 
 import nmm
+from nmm.base.trust import trusting
+from nmm.cli.app import app
 from nmm.cli.exit_status import status_of
 from nmm.model.robots.loading.report import file_report
-from nmm.model.robots.loading.trust import trusting
 
 pytestmark = pytest.mark.usefixtures("xacro_each_time")
 
@@ -258,3 +262,105 @@ def test_scenarios_cannot_trust_themselves() -> None:
     assert "trust" not in nmm.Scenario.load("unicycle_2r_position").resolved()["robot"]
     with pytest.raises(nmm.ScenarioError):
         nmm.Scenario.load("unicycle_2r_position", {"robot.trust": True})
+
+
+#: Short texts that a machine would work or fill its memory for.
+HUNGRY = {
+    "format": "len((\"%(a)s\" * 2000) % dict(a='x' * 10**6))",
+    "rounded": "round(7, -20000000)",
+    "multiple": f"math.lcm({', '.join(str(10**9 + 7 + 2 * k) for k in range(500))})",
+    "slices": "len([('x' * 10**7)[k:] for k in python.range(10)])",
+    "slice by its object": "len([('x' * 10**7)[python.slice(k, None)] for k in python.range(10)])",
+    "rows": f"len(list(python.zip({', '.join(['python.range(10**6)'] * 49)})))",
+    "printed": "len([xacro.message('x' * 10**6) for k in python.range(60)])",
+}
+
+
+@pytest.mark.parametrize("name", HUNGRY)
+def test_expressions_that_ask_for_gigabytes_or_hours_are_refused(tmp_path: Path, name: str) -> None:
+    text = HUNGRY[name].replace("<", "&lt;").replace('"', "&quot;")
+    file = written(tmp_path / "r.xacro", f'<link name="${{{text}}}"/>')
+    for trust in (False, True):
+        with pytest.raises(nmm.RobotError) as caught:
+            links(file, trust=trust)
+        assert holds(caught.value.findings[0], "beyond_bound"), caught.value
+
+
+def test_sets_of_sets_are_counted_by_what_they_say(tmp_path: Path) -> None:
+    parts = "".join(
+        f'<xacro:property name="a{k + 1}" value="${{python.frozenset([(a{k}, 1), (a{k}, 2)])}}"/>'
+        for k in range(40)
+    )
+    file = written(
+        tmp_path / "r.xacro",
+        '<xacro:property name="a0" value="x"/>',
+        parts,
+        '<link name="${len(str(a40))}"/>',
+    )
+    with pytest.raises(nmm.RobotError) as caught:
+        links(file)
+    assert holds(caught.value.findings[0], "beyond_bound")
+
+
+def test_folders_elsewhere_are_not_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "other").mkdir()
+    listed: list[str] = []
+    monkeypatch.setattr("glob.glob", lambda pattern: listed.append(pattern) or [])
+    for pattern in (f"{tmp_path}/other/*.xacro", f"{tmp_path}/*/part.xacro", "*/../../other/*.xacro"):
+        file = written(tmp_path / "robot" / "r.xacro", f'<xacro:include filename="{pattern}"/>')
+        refusal(file)
+    assert listed == []
+    own = written(
+        tmp_path / "robot" / "r.xacro", '<xacro:include filename="parts/*.xacro"/>', '<link name="a"/>'
+    )
+    links(own)
+    assert listed == [str(tmp_path / "robot" / "parts" / "*.xacro")]
+
+
+def scenario_of_a_program(folder: Path) -> Path:
+    """A scenario whose robot's file calls a method."""
+    written(folder / "r.xacro", "<link name=\"${'a'.upper()}\"/>")
+    robot = {"source": str(folder / "r.xacro"), "platform": "omnidirectional", "wheels": []}
+    task = {"kind": "position", "frame": "A", "axes": "xy", "reference": [1.0, 0.5]}
+    data = {"robot": robot, "q0": {}, "task": task, "duration": 0.05, "resolver": {"kind": "pg"}}
+    file = folder / "own.yaml"
+    file.write_text(yaml.safe_dump(data), encoding="utf-8")
+    return file
+
+
+def test_scenarios_are_trusted_from_python(tmp_path: Path) -> None:
+    file = scenario_of_a_program(tmp_path)
+    with pytest.raises(nmm.ScenarioError, match="--trust"):
+        nmm.Scenario.load(file).robot()
+    trusted = nmm.Scenario.load(file, trust=True)
+    assert trusted.robot().n == 3
+    assert trusted.override("robot.limits", {"vx": 0.5}).robot().n == 3
+    assert pickle.loads(pickle.dumps(trusted)).robot().n == 3
+
+
+def test_every_command_that_opens_a_scenario_or_run_takes_trust(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    without = {"paper", "scenarios", "robots"}
+    taking = {
+        command.name: "trust" in inspect.signature(command.callback).parameters
+        for command in app.registered_commands
+        if command.callback is not None
+    }
+    assert {name for name, takes in taking.items() if not takes} == without
+    file, run, log = scenario_of_a_program(tmp_path), tmp_path / "run", tmp_path / "a.mcap"
+    assert status_of(["run", str(file), "--out", str(run), "--trust"]) == 0
+    for trust, status in ((["--trust"], 0), ([], 2)):
+        assert status_of(["export", str(run), str(log), "--mcap", *trust]) == status
+    assert "--trust" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_rows_of_a_sweep_are_trusted(tmp_path: Path, jobs: str) -> None:
+    pq = pytest.importorskip("pyarrow.parquet")
+    file = scenario_of_a_program(tmp_path)
+    command = ["sweep", str(file), "--vary", "robot.limits.vx=0.5,0.6,0.7", "--jobs", jobs]
+    assert status_of([*command, "--out", str(tmp_path / "refused")]) == 2
+    assert status_of([*command, "--out", str(tmp_path / "swept"), "--trust"]) == 0
+    rows = pq.read_table(tmp_path / "swept" / "rows.parquet", partitioning=None)
+    assert rows["outcome"].to_pylist() == ["completed"] * 3

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from nmm.base.errors import InputError, expect
-from nmm.cli.groups import Browser, EllipsoidGroup, Loading, Subject, command
+from nmm.cli.groups import Browser, EllipsoidGroup, Loading, Subject, command, opening_command
 from nmm.cli.options import ARM, AT, ROBOT_HELP, SUBJECT_SET, arguments_of, flag, option, task_option
 from nmm.cli.output import progress, show_text, warn
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A folder of `nmm run` or `nmm compare`.")]
 
 
-@command
+@opening_command
 def play(folder: RunFolder, browser: Browser, ellipsoids: EllipsoidGroup) -> None:
     """Play a run in the browser.
 
@@ -38,7 +38,7 @@ def play(folder: RunFolder, browser: Browser, ellipsoids: EllipsoidGroup) -> Non
     play_runs(runs_in(folder), **browser.keywords(), ellipsoids=drawn)
 
 
-@command
+@opening_command
 def render(
     folder: RunFolder,
     video: Path = option("FILE", "Ends in .mp4, .webm or .gif.", default=...),

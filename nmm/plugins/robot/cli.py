@@ -12,13 +12,13 @@ import typer
 
 from nmm.base.errors import InputError
 from nmm.base.plugins import OptionGroup
-from nmm.cli.groups import command
+from nmm.cli.groups import opening_command
 from nmm.cli.interrupts import shielded
 from nmm.cli.options import flag, names_of, option
 from nmm.cli.output import OK, show_table, show_text, warn
 
 
-@command
+@opening_command
 def export(
     folder: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A folder of `nmm run`.")],
     file: Annotated[

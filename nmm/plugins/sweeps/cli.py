@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from nmm.base.errors import InputError, expect, no_such
+from nmm.cli.groups import opening_command
 from nmm.cli.options import SetOption, option, settings_of
 from nmm.cli.output import FAILED, OK, bar_of, complain, show_table, warn
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 WINDOW = 300.0
 
 
+@opening_command
 def sweep(
     scenario: Annotated[
         str,

@@ -22,6 +22,7 @@ import numpy as np
 from nmm import __version__
 from nmm.base.errors import InputError, RunError
 from nmm.base.progress import Progress
+from nmm.base.trust import trusting
 from nmm.control.step.quantities import placed
 from nmm.motion.diagnosis.summary import RUN_NUMBERS
 from nmm.plugins.sweeps.definition import Definition, Listed
@@ -145,9 +146,10 @@ def rows_of(
     keep: Keep | None = None,
     progress: Progress | None = None,
     threads: int = 1,
+    trust: bool = False,
 ) -> list[dict[str, Any]]:
     """The rows of these numbers, in order: cells by column (`columns_of`), None where unknown. `keep` is
-    called with each row's number and trajectory, if there is one.
+    called with each row's number and trajectory, if there is one. `trust` is of xacro files of its robots.
 
     A failed rollout's row says why: `outcome` "refused" for invalid settings (a start outside limits),
     "error" for an unexpected exception. Cells do not depend on `threads`; with several, Ctrl-C takes effect
@@ -157,7 +159,8 @@ def rows_of(
     rows: list[dict[str, Any]] = []
 
     def rollout(k: int) -> dict[str, Any]:
-        return _rollout(definition, indices[k], changes[k], keep)
+        with trusting(trust):
+            return _rollout(definition, indices[k], changes[k], keep)
 
     def add(cells: dict[str, Any]) -> None:
         k = len(rows)
@@ -259,8 +262,11 @@ class Computed(NamedTuple):
     runs: dict[int, dict[str, bytes]]
 
 
-def computed(chunk: int, progress: Progress | None, definition: Definition, threads: int = 1) -> Computed:
-    """Chunk number `chunk` of a sweep; `RunError` where this process has another version of nmm."""
+def computed(
+    chunk: int, progress: Progress | None, definition: Definition, threads: int = 1, trust: bool = False
+) -> Computed:
+    """Chunk number `chunk` of a sweep, whose robots' files may be trusted; `RunError` where this process has
+    another version of nmm."""
     if definition.version != __version__:
         raise RunError(
             f"a worker has nmm {__version__}, and the sweep is of nmm {definition.version}: expected the same"
@@ -274,4 +280,5 @@ def computed(chunk: int, progress: Progress | None, definition: Definition, thre
             runs[index] = {path.name: path.read_bytes() for path in saved.iterdir()}
 
     keeper = keep if definition.keep else None
-    return Computed(rows_of(definition, definition.indices(chunk), keeper, progress, threads), runs)
+    rows = rows_of(definition, definition.indices(chunk), keeper, progress, threads, trust)
+    return Computed(rows, runs)

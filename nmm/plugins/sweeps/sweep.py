@@ -165,7 +165,7 @@ class Sweep:
             again = place.damaged(missing)
             done = _Done(definition, missing, progress)
             threads = self._threads(local, sum(map(len, map(definition.indices, missing))))
-            job = partial(computed, definition=definition)
+            job = partial(computed, definition=definition, trust=self.scenario.trust)
             if missing:
                 results = (
                     as_done(partial(job, threads=threads), missing, -(-local // threads), done.report)

@@ -19,8 +19,13 @@ MOST_STEPS, STEPS_OF_A_FILE, PATIENCE = 500_000, 100, 10.0
 LONGEST, LONGEST_EXPRESSION, LONGEST_YAML, MOST_BITS = 50_000_000, 20_000, 1_000_000, 10_000
 #: Elements in a file or in what becomes of it, its links, those in a row, and joints that move.
 MOST_ELEMENTS, MOST_LINKS, MOST_IN_A_ROW, MOST_MOVING = 200_000, 10_000, 1_000, 500
+#: Digits of a number that is written, as wide as a format may ask for, or rounded to.
+MOST_DIGITS = 999
 #: Functions whose integers have as many digits as the argument is large.
 _GROWING = (math.factorial, math.comb, math.perm)
+#: Those that take all that an iterator gives.
+_CONSUMERS = (list, tuple, set, frozenset, dict, sorted, max, min, any, all)
+_ITEMS = str | list | tuple | dict | set | frozenset
 #: Of printf's formats those that say how wide a text is.
 _WIDE = re.compile(r"%(?:\([^)]*\))?[-+ #0]*(?:\*|\d{4}|\d*\.(?:\*|\d{4}))")
 
@@ -59,7 +64,7 @@ class Budget:
         self.step()
         if isinstance(value, int) and value.bit_length() > MOST_BITS:
             raise BeyondBound("bits in an integer", MOST_BITS)
-        if isinstance(value, str | list | tuple | dict | set | range):
+        if isinstance(value, _ITEMS | range):
             self._length += len(value)
             if self._length > LONGEST:
                 raise BeyondBound("characters and items for xacro", LONGEST)
@@ -67,22 +72,30 @@ class Budget:
 
     def each(self, items: Iterable[Any]) -> Iterator[Any]:
         for item in items:
-            self.step()
-            yield item
+            yield self.took(item)
 
     def called(self, function: Any, *arguments: Any, **named: Any) -> Any:
         if function in _GROWING and max(map(abs, arguments), default=0) > 1_000:
             raise BeyondBound("bits in an integer", MOST_BITS)
+        digits = (*arguments, *named.values(), 0)[1] if function is round else 0
+        if isinstance(digits, int) and abs(digits) > MOST_DIGITS:
+            raise BeyondBound("digits of a number", MOST_DIGITS)
         if function is sum or function is math.prod:
             add, first = (self.plus, 0) if function is sum else (self.times, 1)
             rest = [*arguments[1:], *named.values()]  # where it starts
             return self.took(reduce(add, self.each(arguments[0]), *(rest or [first])))
+        if function is math.lcm:
+            return reduce(lambda left, right: self.took(math.lcm(left, right)), arguments, 1)
+        if function in _CONSUMERS:
+            arguments = tuple(
+                self.each(one) if isinstance(one, Iterator | range) else one for one in arguments
+            )
         if function in (map, filter) and arguments and callable(arguments[0]):
             arguments = (partial(self.called, arguments[0]), *arguments[1:])
         if callable(named.get("key")):
             named["key"] = partial(self.called, named["key"])
         value = self.took(function(*arguments, **named))
-        return self.display(value) if isinstance(value, list | tuple | dict | set) else value
+        return self.display(value) if isinstance(value, _ITEMS) else value
 
     def power(self, base: Any, exponent: Any) -> Any:
         if isinstance(base, int) and isinstance(exponent, int) and base.bit_length() * exponent > MOST_BITS:
@@ -101,9 +114,13 @@ class Budget:
         return self.took(value) if isinstance(value, str | list | tuple) else value
 
     def modulo(self, left: Any, right: Any) -> Any:
-        if isinstance(left, str) and _WIDE.search(left):
-            raise BeyondBound("characters of a number's width", 999)
-        return left % right
+        if isinstance(left, str):
+            if _WIDE.search(left):
+                raise BeyondBound("characters of a number's width", MOST_DIGITS)
+            longest = len(left) + left.count("%") * (_size(right, {}) + MOST_DIGITS)
+            if longest > LONGEST:
+                raise BeyondBound("characters and items for xacro", LONGEST)
+        return self.took(left % right)
 
     def display(self, value: Any) -> Any:
         """A list, tuple, set or mapping: lists of lists double with each, but for what they say."""
@@ -121,7 +138,7 @@ def _size(value: Any, sizes: dict[int, int]) -> int:
     """How many characters and items a value would have written out; each of its parts is counted once."""
     if isinstance(value, str):
         return len(value)
-    if not isinstance(value, list | tuple | dict | set):
+    if not isinstance(value, _ITEMS):
         return 1
     if id(value) not in sizes:
         sizes[id(value)] = 1
@@ -133,6 +150,6 @@ def _size(value: Any, sizes: dict[int, int]) -> int:
 
 def _items(value: Any) -> Iterable[Any]:
     kind: Callable[[Any], Iterable[Any]] = next(
-        one.__iter__ for one in (list, tuple, set) if isinstance(value, one)
+        one.__iter__ for one in (list, tuple, set, frozenset) if isinstance(value, one)
     )
     return kind(value)

@@ -181,7 +181,7 @@ def expand(
     import xacro.substitution_args
 
     table, budget = _Arguments(arguments), Budget()
-    printed = io.StringIO()
+    printed = _Printed(budget)
     with _LOCK, _patched(xacro, packages, budget, call), redirect_stderr(printed):
         try:
             xml = budget.took(xacro.process_file(str(path), mappings=table).toxml())
@@ -193,6 +193,17 @@ def expand(
             xacro.init_stacks(None)
     warnings = [line for line in printed.getvalue().splitlines() if line.startswith("warning: ")]
     return str(xml), {name: table[name] for name in table.declared}, tuple(dict.fromkeys(warnings))
+
+
+class _Printed(io.StringIO):
+    """What a file has xacro print, as far as its budget goes."""
+
+    def __init__(self, budget: Budget) -> None:
+        super().__init__()
+        self._budget = budget
+
+    def write(self, text: str) -> int:
+        return super().write(self._budget.took(text))
 
 
 class _Arguments(dict[str, str]):

@@ -12,8 +12,9 @@ import re
 from functools import lru_cache
 from typing import Any
 
+from nmm.base.trust import is_trusted
 from nmm.model.robots.loading.budget import LONGEST_EXPRESSION, BeyondBound, Budget
-from nmm.model.robots.loading.trust import is_trusted, untrusted
+from nmm.model.robots.loading.trust import untrusted
 
 _NODES: tuple[type[ast.AST], ...] = (
     *(ast.Expression, ast.Constant, ast.Name, ast.expr_context, ast.List, ast.Tuple, ast.Dict, ast.Set),
@@ -40,7 +41,9 @@ _BUILTINS = (
 #: The names under which expressions have the methods of `Operations`; with the blank no file can write them.
 _NAMES = {
     name: f"nmm {name}"
-    for name in ("each", "called", "power", "times", "plus", "modulo", "shift", "display", "attribute")
+    for name in (
+        *("each", "called", "took", "power", "times", "plus", "modulo", "shift", "display", "attribute"),
+    )
 }
 _OPERATORS: dict[type[ast.operator], str] = {
     ast.Pow: "power",
@@ -91,6 +94,10 @@ class _Counted(ast.NodeTransformer):
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
         self.generic_visit(node)
         return node if self._trusted else _call("attribute", node.value, ast.Constant(node.attr))
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        self.generic_visit(node)  # a slice copies; an item by its number or name does not
+        return node if isinstance(node.slice, ast.Constant) else _call("took", node)
 
     def visit_comprehension(self, node: ast.comprehension) -> ast.comprehension:
         self.generic_visit(node)

@@ -11,6 +11,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from nmm.base.errors import RobotError, expect_kind, one_or_several
+from nmm.base.trust import trusting
 from nmm.model.platforms import Platform, platform_by_name
 from nmm.model.robots.loading.draft import LoadOptions
 from nmm.model.robots.loading.packages import PACKAGE, package_file
@@ -24,7 +25,6 @@ from nmm.model.robots.loading.srdf_fitting import (
     with_semantics,
     with_states,
 )
-from nmm.model.robots.loading.trust import trusting
 from nmm.model.robots.robot import Robot
 
 

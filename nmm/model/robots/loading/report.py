@@ -12,6 +12,7 @@ from nmm.base.errors import InputError, RobotError, expect_known, few
 from nmm.base.findings import Finding
 from nmm.base.findings.robot_file import line_of
 from nmm.base.text_format import counted, one_line
+from nmm.base.trust import is_trusted, trusting
 from nmm.model.robots.loading.check import inspect
 from nmm.model.robots.loading.check_parts import advice
 from nmm.model.robots.loading.description import Description, argument_texts, describe, expand
@@ -20,7 +21,6 @@ from nmm.model.robots.loading.load import load
 from nmm.model.robots.loading.locking import limit_notes
 from nmm.model.robots.loading.packages import Packages
 from nmm.model.robots.loading.provenance import acceleration_notes, provenance_of
-from nmm.model.robots.loading.trust import is_trusted, trusting
 from nmm.model.robots.loading.xml_tree import Element, children, link_at
 from nmm.model.robots.meshes import read_meshes
 from nmm.model.robots.robot import Robot

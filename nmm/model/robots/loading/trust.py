@@ -7,13 +7,11 @@ functions (`expressions.py`), and neither environment variables nor files elsewh
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nmm.base.findings import Finding
+from nmm.base.trust import is_trusted
 from nmm.model.robots.loading.budget import Refused
 
 if TYPE_CHECKING:
@@ -22,35 +20,18 @@ if TYPE_CHECKING:
 #: So many folders above a description may be the ROS package that it is of.
 _NEAR = 5
 
-_TRUSTED: ContextVar[bool] = ContextVar("xacro_trusted", default=False)
-
-
-def is_trusted() -> bool:
-    """Whether the xacro files that are read now may run programs."""
-    return _TRUSTED.get()
-
-
-@contextmanager
-def trusting(trust: bool) -> Iterator[None]:
-    """Files that are read in the block are trusted, if that is asked for here or was around it."""
-    before = _TRUSTED.set(trust or _TRUSTED.get())
-    try:
-        yield
-    finally:
-        _TRUSTED.reset(before)
-
 
 def untrusted(what: str, text: str = "") -> Refused:
     return Refused(Finding("xacro_untrusted", {"what": what}), text)
 
 
-def check_readable(name: str, packages: Packages) -> None:
-    """`Refused` for a file that is neither in the robot's folder or package nor in one that it asked for."""
-    if is_trusted() or not os.path.lexists(name) or _is_within(name, packages):
+def check_readable(name: str, packages: Packages, pattern: str = "") -> None:
+    """`Refused` for a file that is neither in the robot's folder or package nor in one that it asked for.
+    Where a file may be that matches a pattern, `name`, no folder is listed before."""
+    if is_trusted() or not (pattern or os.path.lexists(name)) or _is_within(name, packages):
         return
-    raise untrusted(
-        f"reading {os.path.basename(name)} from outside its folder and packages", os.path.basename(name)
-    )
+    text = os.path.basename(pattern or name)
+    raise untrusted(f"reading {text} from outside its folder and packages", text)
 
 
 def _is_within(name: str, packages: Packages) -> bool:

@@ -14,10 +14,11 @@ from types import SimpleNamespace
 from typing import Any
 
 from nmm.base.files import read_bytes
+from nmm.base.trust import is_trusted
 from nmm.model.robots.loading.budget import LONGEST, LONGEST_YAML, BeyondBound, Budget
 from nmm.model.robots.loading.expressions import Operations, compiled, evaluated, symbols
 from nmm.model.robots.loading.packages import Packages
-from nmm.model.robots.loading.trust import check_readable, is_trusted, untrusted
+from nmm.model.robots.loading.trust import check_readable, untrusted
 
 Replacement = tuple[Any, str, Any]
 _QUOTED = re.compile("'[^']*'|\"[^\"]*\"")
@@ -56,7 +57,7 @@ def replacements(
         return io.StringIO(read_bytes(Path(name), LONGEST_YAML).decode("utf-8-sig"))
 
     def matching(pattern: str) -> list[str]:
-        check_readable(re.split("[*?[]", pattern)[0] + "_", packages)  # before any folder is listed
+        check_readable(re.sub(r"[*?[\]]", "_", pattern), packages, pattern)
         return glob.glob(pattern)
 
     minidom = xacro.xml.dom.minidom
