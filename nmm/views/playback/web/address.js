@@ -1,5 +1,5 @@
-// The address is the state: #t=12.5&view=top&apart=1&grid=off&hide=pg&plots=H,error&zoom=2,7, and where somebody
-// has put the camera, &camera=eye's x,y,z,target's x,y,z. What it says otherwise is ignored.
+// The address is the state: #t=12.5&view=top&apart=1&grid=off&hide=pg&plots=H,error&plot=y~x&zoom=2,7, and where
+// somebody has put the camera, &camera=eye's x,y,z,target's x,y,z. What it says otherwise is ignored.
 "use strict";
 {
   const address = (nmm.address = {});
@@ -23,6 +23,7 @@
     if (plots.shown !== stage.plots || (plots.shown && open.join() !== plots.first.join())) {
       parts.push(`plots=${open.join(",") || "folded"}`);
     }
+    parts.push(...nmm.own.text());
     const { from, to } = player.range;
     if (from > 0 || to < stage.duration) parts.push(`zoom=${short(from)},${short(to)}`);
     return `#${parts.join("&")}`;
@@ -62,6 +63,7 @@
       const hidden = words(wanted.get("hide"));
       for (const run of runs) nmm.hide(run, hidden.includes(run.id));
     }
+    nmm.own.read(wanted.getAll("plot"));
     if (wanted.has("plots")) {
       const named = words(wanted.get("plots"));
       const known = plots.ids().filter((id) => named.includes(id.toLowerCase()));

@@ -1,112 +1,38 @@
-// How one panel's canvas is drawn: a lane a channel, one over another, all runs in each.
+// How one panel's canvas is drawn: a lane a channel, one over another, all runs in each. A lane of one's own holds
+// several channels, in colours of their own, over time or over another channel.
 "use strict";
 {
   const curves = (nmm.curves = {});
+  const { axes } = nmm;
   // Pixels left of the curves and right of them; a lane's height alone in its panel and among others, where its
   // name stands above it; and below a lane.
   Object.assign(curves, { LEFT: 56, RIGHT: 10, GAP: 6 });
   const [ALONE, AMONG, NAME] = [84, 46, 15];
   const ROW = 20;
-  const TINY = 1e-13;
 
-  curves.height = (lane, count) =>
-    lane.key === "partition" ? ROW * Math.max(1, having(lane).length) + 6 : count > 1 ? NAME + AMONG : ALONE;
-
-  const having = (lane) => nmm.runs.filter((run) => run.columns[lane.key] && !run.hidden);
-
-  // 1, 2 or 5 times a power of ten, of which at most about `count` fit into a width.
-  curves.step = (width, count) => {
-    const raw = width / count;
-    const power = 10 ** Math.floor(Math.log10(raw));
-    return power * ([1, 2, 5].find((factor) => factor * power >= raw) || 10);
-  };
-  curves.number = (value, step) => {
-    const size = Math.abs(value);
-    if (size < 1e-9 * step) return "0";
-    const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
-    const text = value.toFixed(digits);
-    // As many digits as tell one tick from the next.
-    const told = Math.max(0, Math.floor(Math.log10(size)) - Math.floor(Math.log10(step) + 1e-9));
-    const short = size >= 1e5 || text.length > 8 ? value.toExponential(told) : text;
-    return short.replaceAll("-", "−").replace("e+", "e");
+  curves.height = (lane, count) => {
+    if (lane.key === "partition") return ROW * Math.max(1, curves.traces(lane).length) + 6;
+    return lane.height ?? (count > 1 ? NAME + AMONG : ALONE);
   };
 
-  // A time to the digits of a step, without the zeros that say nothing.
-  curves.time = (value, step) => String(Number(value.toFixed(Math.max(0, Math.ceil(-Math.log10(step) - 1e-9))))).replace("-", "−");
-
+  // The lines of a lane: of each channel, each run that has it and is shown.
+  curves.traces = (lane) =>
+    (lane.signals ?? [lane]).flatMap(({ key, color }) =>
+      nmm.runs
+        .filter((run) => run.columns[key] && (!lane.over || run.columns[lane.over]) && !run.hidden)
+        .map((run) => ({ run, key, column: run.columns[key], color: color ?? run.color })),
+    );
   // The samples of a run that are seen between two times, and one beyond each.
   const seen = (run, [from, to]) => [
     Math.max(0, nmm.before(run.t, from)),
     Math.min(run.t.length - 1, nmm.before(run.t, to) + 1),
   ];
-
-  // What a lane's axis reaches over: the curves seen, and their limits where these are not far away.
-  curves.scale = (lane, range) => {
-    let [low, high, positive] = [Infinity, -Infinity, Infinity];
-    const limits = new Map(); // each with whether it is an upper one
-    for (const run of having(lane)) {
-      const column = run.columns[lane.key];
+  curves.seen = seen;
+  const seenOf = (traces, range, key) =>
+    traces.map(({ run, column }) => {
       const [first, last] = seen(run, range);
-      for (let i = first; i <= last; i++) {
-        const value = column.values[i];
-        if (!Number.isFinite(value)) continue;
-        if (value < low) low = value;
-        if (value > high) high = value;
-        if (value > TINY && value < positive) positive = value;
-      }
-      column.limits.forEach((end, i) => end !== null && limits.set(end, i === 1));
-    }
-    if (low > high) return { nothing: "no values here" };
-    if (lane.log && high <= TINY) return { nothing: high === 0 ? "0 throughout" : "0 throughout, but for rounding" };
-    if (lane.log && low >= 0) {
-      let [least, most] = [Math.log10(Math.max(positive, 1e-10 * high)), Math.log10(high)];
-      if (most - least < 0.3) [least, most] = [least - 0.15, most + 0.15];
-      const room = 0.06 * (most - least);
-      return { log: true, low: least - room, high: most + room, limits: [] };
-    }
-    const span = high - low;
-    for (const end of limits.keys()) {
-      const wide = Math.max(high, end) - Math.min(low, end);
-      if (wide <= Math.max(2.5 * span, 1e-12)) [low, high] = [Math.min(low, end), Math.max(high, end)];
-    }
-    // A value that hardly moves is not shown as noise, nor with numbers that have no room.
-    const most = Math.max(Math.abs(low), Math.abs(high));
-    const half = most < 1e-12 ? 1 : 2.5e-4 * most;
-    if (high - low < 2 * half) [low, high] = [low - half, high + half];
-    const room = 0.08 * (high - low);
-    return { log: false, low: low - room, high: high + room, limits: [...limits] };
-  };
-
-  // The least of 1, 2, 4 or 5 times a power of ten of which no more than `most` lie between two values: that
-  // leaves at least two of them, for `most` of 3 or more.
-  function between(low, high, most) {
-    const count = (step) => Math.floor(high / step + 1e-9) - Math.ceil(low / step - 1e-9) + 1;
-    for (let power = 10 ** Math.floor(Math.log10((high - low) / most) - 1); ; power *= 10) {
-      const factor = [1, 2, 4, 5].find((factor) => count(factor * power) <= most);
-      if (factor) return factor * power;
-    }
-  }
-
-  const raised = (power) => `10${String(power).replace(/./g, (c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c]))}`;
-
-  function ticks({ log, low, high }, height) {
-    const most = height > 70 ? 5 : 3;
-    const step = log ? Math.max(1, Math.ceil((high - low) / most)) : between(low, high, most);
-    const found = [];
-    for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) {
-      found.push({ at: k * step, text: log ? raised(k * step) : curves.number(k * step, step) });
-    }
-    if (!log || found.length > 1) return found;
-    // Within one decade a logarithmic axis has its 2 and 5, too, or says where it ends.
-    for (let k = Math.floor(low); k < high; k++) {
-      for (const factor of [2, 5]) {
-        const at = k + Math.log10(factor);
-        if (at > low && at < high) found.push({ at, text: `${factor}·${raised(k)}` });
-      }
-    }
-    const few = (value) => String(Number((10 ** value).toPrecision(3)));
-    return found.length > 1 ? found : [low, high].map((at) => ({ at, text: few(at) }));
-  }
+      return { column: key ? run.columns[key] : column, first, last };
+    });
 
   // The line through a run's samples; of many in one column of pixels the extremes.
   function trace(pen, run, values, range, x, y) {
@@ -155,7 +81,7 @@
   };
 
   function band(pen, lane, top, { range, x, right, colors }) {
-    having(lane).forEach((run, row) => {
+    curves.traces(lane).forEach(({ run }, row) => {
       const values = run.columns[lane.key].values;
       const [y, height] = [top + 3 + row * ROW, ROW - 3];
       let [from, end] = seen(run, range);
@@ -183,15 +109,22 @@
   // about: {range, x: time -> px, right: px, marks: times of the grid, alone: whether no other lane is in the
   // panel, colors}
   curves.draw = (pen, lane, upper, whole, about) => {
-    const { x, right, colors, alone } = about;
-    const [top, height] = alone ? [upper, whole] : [upper + NAME, whole - NAME];
+    const { right, colors, alone } = about;
+    const below = lane.over ? 16 : 0;
+    const [top, height] = alone ? [upper, whole - below] : [upper + NAME, whole - NAME];
     pen.font = colors.font;
     pen.textBaseline = "middle";
     pen.textAlign = "left";
     if (lane.key === "partition") return band(pen, lane, upper, about);
-    const scale = curves.scale(lane, about.range);
-    const y = (value) =>
-      top + height * (1 - ((scale.log ? (value > 0 ? Math.log10(value) : NaN) : value) - scale.low) / (scale.high - scale.low));
+    const traces = curves.traces(lane);
+    const scale = axes.over(seenOf(traces, about.range), lane.log, lane.zoom);
+    const across = lane.over ? axes.over(seenOf(traces, about.range, lane.over), false, lane.zoomAcross) : null;
+    const nothing = scale.nothing || across?.nothing;
+    if (across && !nothing && lane.square) square(scale, across, height, right - curves.LEFT);
+    const share = ({ low, high, log }, value) => ((log ? (value > 0 ? Math.log10(value) : NaN) : value) - low) / (high - low);
+    const y = (value) => top + height * (1 - share(scale, value));
+    const x = across ? (value) => curves.LEFT + (right - curves.LEFT) * share(across, value) : about.x;
+    Object.assign(lane, { scale: nothing ? null : scale, across, plot: { top, height, x, y } });
     const level = (value, color, width = 1) => {
       pen.fillStyle = color;
       pen.fillRect(curves.LEFT, Math.round(value - 0.5 * width), right - curves.LEFT, width);
@@ -199,10 +132,11 @@
     pen.fillStyle = colors.plot;
     pen.fillRect(curves.LEFT, top, right - curves.LEFT, height);
     pen.fillStyle = colors.line;
-    for (const mark of about.marks) pen.fillRect(Math.round(x(mark)), top, 1, height);
+    if (!across) for (const mark of about.marks) pen.fillRect(Math.round(x(mark)), top, 1, height);
     const away = [];
-    if (!scale.nothing) {
-      for (const { at, text } of ticks(scale, height)) {
+    if (!nothing) {
+      if (across) numbersBelow(pen, lane, x, right, colors);
+      for (const { at, text } of axes.ticks(scale, height)) {
         const px = top + height * (1 - (at - scale.low) / (scale.high - scale.low));
         level(px, at === 0 && !scale.log ? colors.zero : colors.line);
         pen.fillStyle = colors.quiet;
@@ -214,22 +148,59 @@
       pen.beginPath();
       pen.rect(curves.LEFT, top, right - curves.LEFT, height);
       pen.clip();
-      for (const [end, upper] of scale.limits) {
+      for (const [end, upper] of lane.signals ? [] : scale.limits) {
         if (end < scale.low || end > scale.high) away.push(end);
         else limit(pen, y(end), top, height, { upper, right, colors });
       }
       pen.lineJoin = "round";
       pen.lineWidth = 1.7;
-      for (const run of having(lane)) {
-        pen.strokeStyle = pen.fillStyle = run.color;
+      for (const { run, column, color } of traces) {
+        pen.strokeStyle = pen.fillStyle = color;
         pen.setLineDash(run.dash);
-        trace(pen, run, run.columns[lane.key].values, about.range, x, y);
+        if (across) way(pen, run.columns[lane.over].values, column.values, seen(run, about.range), x, y);
+        else trace(pen, run, column.values, about.range, x, y);
       }
       pen.restore();
     }
-    tell(pen, lane, upper, scale.nothing || limits(away), about);
+    tell(pen, lane, upper, nothing || limits(away), about);
     return undefined;
   };
+
+  // The line through the points of two channels, broken where either has no value.
+  function way(pen, along, values, [first, last], x, y) {
+    pen.beginPath();
+    let open = false;
+    for (let i = first; i <= last; i++) {
+      const [left, top] = [x(along[i]), y(values[i])];
+      const known = Number.isFinite(left) && Number.isFinite(top);
+      if (known && open) pen.lineTo(left, top);
+      else if (known) pen.moveTo(left, top);
+      open = known;
+    }
+    pen.stroke();
+  }
+
+  // A metre is as long in both directions: the shorter axis reaches farther.
+  function square(scale, across, height, width) {
+    const [down, along] = [(scale.high - scale.low) / height, (across.high - across.low) / width];
+    const [one, factor] = down > along ? [across, down / along] : [scale, along / down];
+    const [middle, half] = [0.5 * (one.low + one.high), 0.5 * factor * (one.high - one.low)];
+    Object.assign(one, { low: middle - half, high: middle + half });
+  }
+
+  function numbersBelow(pen, { across, plot: { top, height } }, x, right, colors) {
+    let end = -Infinity;
+    for (const { at, text } of axes.ticks(across, 90)) {
+      pen.fillStyle = at === 0 ? colors.zero : colors.line;
+      pen.fillRect(Math.round(x(at)), top, 1, height);
+      const wide = pen.measureText(text).width;
+      const left = Math.min(Math.max(x(at) - 0.5 * wide, curves.LEFT), right - wide);
+      if (left < end + 6) continue;
+      pen.fillStyle = colors.quiet;
+      pen.fillText(text, left, top + height + 9);
+      end = left + wide;
+    }
+  }
 
   // Limits that are out of the picture.
   function limits(ends) {

@@ -1,5 +1,6 @@
 // The plots beside the scene: panels that fold, one cursor over all of them, press to seek, zoom in time. A pointer
 // over a plot has a line of its own through all of them; headers tell each run's value there, else at the cursor.
+// Over the numbers of an axis, a wheel zooms it and a drag moves it.
 // Curves are drawn once for a size, a zoom, a theme and what is shown; a seek moves the cursor and nothing else.
 "use strict";
 {
@@ -20,7 +21,7 @@
   };
 
   function marks() {
-    const step = nmm.curves.step(span(), Math.max(2, width / 70));
+    const step = nmm.axes.step(span(), Math.max(2, width / 70));
     const start = nmm.stage.start;
     const [from, to] = range();
     const found = [];
@@ -66,7 +67,7 @@
     // Both ends first, to a hundredth of a step, and of what is between them what has room.
     const taken = [[0, pen.measureText("t [s]").width + 4]];
     range().concat(at).forEach((time, i) => {
-      const text = nmm.curves.time(nmm.stage.start + time, i < 2 ? 0.01 * step : step);
+      const text = nmm.axes.time(nmm.stage.start + time, i < 2 ? 0.01 * step : step);
       const long = pen.measureText(text).width;
       const left = Math.min(Math.max(x(time) - 0.5 * long, taken[0][1]), width - long);
       if (taken.some(([from, to]) => left < to + 6 && left + long + 6 > from) && i > 1) return;
@@ -85,6 +86,7 @@
     for (const panel of plots.panels) if (panel.part.open && panel.stale) drawPanel(panel, about);
     drawRuler(grid, about.colors);
     plots.update();
+    whole();
   };
   plots.redraw = () => {
     for (const panel of plots.panels) panel.stale = true;
@@ -96,7 +98,7 @@
     const at = Math.min(Math.max(x(Math.min(nmm.player.time, nmm.stage.duration)), nmm.curves.LEFT), Math.max(right(), 0));
     cursor.style.transform = `translateX(${at.toFixed(2)}px)`;
     const beyond = nmm.player.beyond();
-    const told = nmm.curves.time(nmm.stage.start + nmm.player.time, 0.01);
+    const told = nmm.axes.time(nmm.stage.start + nmm.player.time, 0.01);
     cursor.className = ["before", "", "after"][beyond + 1];
     cursor.firstChild.textContent = ["", `◀ ${told} s`, `${told} s ▶`][beyond ? 1 + (beyond > 0) : 0];
     tell();
@@ -108,15 +110,16 @@
     const places = nmm.runs.map((run) => nmm.at(run, time));
     for (const { part, lanes } of plots.panels) {
       if (!part.open) continue;
-      for (const { key, values } of lanes) {
-        nmm.runs.forEach((run, i) => {
+      for (const { values, told } of lanes) {
+        told.forEach(({ run, key }, i) => {
           const shown = !run.hidden && run.columns[key] !== undefined;
           if (values[i].hidden === shown) values[i].hidden = !shown;
-          const text = shown ? nmm.values.text(nmm.value(run, key, places[i]), run, key, 4) : "";
+          const text = shown ? nmm.values.text(nmm.value(run, key, places[nmm.runs.indexOf(run)]), run, key, 4) : "";
           if (values[i].lastChild.data !== text) values[i].lastChild.data = text;
         });
       }
     }
+    plots.told?.(time);
   }
   function point(time) {
     pointed = time;
@@ -137,10 +140,10 @@
     changed();
   };
   plots.open = (ids) => {
-    for (const panel of plots.panels) panel.part.open = ids.includes(panel.id);
+    for (const panel of plots.panels) if (!panel.own) panel.part.open = ids.includes(panel.id);
     for (const id of TABLES) get(id).open = ids.includes(id);
   };
-  plots.ids = () => [...plots.panels.map((panel) => panel.id), ...TABLES.filter((id) => !get(id).hidden)];
+  plots.ids = () => [...plots.panels.filter(({ own }) => !own).map((panel) => panel.id), ...TABLES.filter((id) => !get(id).hidden)];
   plots.opened = () => plots.ids().filter((id) => (plots.panels.find((panel) => panel.id === id)?.part ?? get(id)).open);
 
   function thinned() {
@@ -152,60 +155,112 @@
 
   plots.build = (panels) => {
     for (const { id, title, open } of panels) {
-      const part = document.createElement("details");
-      part.className = "panel";
-      part.dataset.panel = id;
-      part.open = open;
       const lanes = nmm.lanes.filter((lane) => lane.panel === id);
       const [only, another] = lanes;
       const symbol = another || id === "partition" ? "" : `, ${nmm.curves.named(only)}`;
-      const summary = part.appendChild(document.createElement("summary"));
-      summary.textContent = `${title}${symbol}`;
-      const canvas = part.appendChild(document.createElement("canvas"));
-      canvas.setAttribute("role", "img");
-      canvas.setAttribute("aria-label", `${title} over time: ${lanes.map((lane) => lane.text).join(", ")}. The values are in the table.`);
-      get("panels").append(part);
-      const panel = { id, part, canvas, lanes, stale: true };
-      plots.panels.push(panel);
-      part.addEventListener("toggle", () => {
-        plots.draw();
-        changed();
-      });
+      const panel = plots.add({ id, lanes, open, title: `${title}${symbol}`, group: title });
+      const about = `${title} over time: ${lanes.map((lane) => lane.text).join(", ")}. The values are in the table.`;
+      panel.canvas.setAttribute("aria-label", about);
       for (const lane of lanes) {
         if (another) {
-          lane.row = nmm.element(part, "div", { class: "row", "aria-hidden": "true" });
+          lane.row = nmm.element(panel.part, "div", { class: "row", "aria-hidden": "true" });
           nmm.element(lane.row, "span", { class: "name" }, lane.text);
           if (lane.unit) nmm.element(lane.row, "span", {}, `[${lane.unit}]`);
           lane.aside = nmm.element(lane.row, "span", { class: "aside" });
         }
-        lane.now = nmm.element(lane.row || summary, "span", { class: "now", "aria-hidden": "true" });
-        lane.values = nmm.runs.map((run) => {
-          const value = nmm.element(lane.now, "span", { hidden: "" }, " ");
-          if (nmm.runs.length > 1) value.prepend(nmm.sign("line", run.color, run.dash));
-          return value;
-        });
+        lane.now = nmm.element(lane.row || panel.summary, "span", { class: "now", "aria-hidden": "true" });
+        plots.head(lane, nmm.runs.map((run) => ({ run, key: lane.key, color: run.color })));
       }
-      listen(panel);
     }
     plots.first = plots.opened();
     for (const id of TABLES) get(id).addEventListener("toggle", changed);
     thinned();
   };
 
-  // Press and drag seek; a pointer that only passes over asks for the values there.
-  function listen({ canvas }) {
-    const seek = (event) => nmm.player.seek(timeAt(event));
+  // A panel at the end of the others; its lanes have no header yet.
+  plots.add = ({ id, title, open, ...rest }) => {
+    const part = nmm.element(get("panels"), "details", { class: "panel", "data-panel": id });
+    part.open = open;
+    const summary = nmm.element(part, "summary", {}, title);
+    const canvas = nmm.element(part, "canvas", { role: "img" });
+    const panel = { id, part, summary, canvas, stale: true, ...rest };
+    plots.panels.push(panel);
+    part.addEventListener("toggle", () => {
+      plots.draw();
+      changed();
+    });
+    listen(panel);
+    return panel;
+  };
+
+  // A place for the value of each line, with its sign where there are several.
+  plots.head = (lane, lines) => {
+    lane.now.replaceChildren();
+    lane.told = lines;
+    lane.values = lines.map(({ run, color }) => {
+      const value = nmm.element(lane.now, "span", { hidden: "" }, " ");
+      if (lines.length > 1) value.prepend(nmm.sign("line", color, run.dash));
+      return value;
+    });
+  };
+
+  // Press and drag seek; a pointer that only passes over asks for the values there. Over the numbers of an axis, a
+  // drag moves it, a wheel zooms it about the pointer, and a double click has all of it seen again.
+  function listen(panel) {
+    const { canvas } = panel;
+    const at = (event) => panel.timeAt?.(event) ?? timeAt(event);
+    const seek = (event) => nmm.player.seek(at(event));
+    let dragged = null; // {lane, y} of an axis
+    const axisAt = (event) => {
+      if (event.offsetX >= nmm.curves.LEFT) return null;
+      return panel.lanes.find((lane) => lane.scale && event.offsetY >= lane.top && event.offsetY < lane.bottom) ?? null;
+    };
+    const set = (lane, low, high) => {
+      lane.zoom = { low, high };
+      panel.stale = true;
+      plots.draw();
+    };
     canvas.addEventListener("pointerdown", (event) => {
       if (event.button !== 0) return;
       canvas.setPointerCapture(event.pointerId);
       point(null);
-      seek(event);
+      const lane = axisAt(event);
+      dragged = lane && { lane, y: event.clientY };
+      if (!lane) seek(event);
     });
     canvas.addEventListener("pointermove", (event) => {
+      if (dragged) {
+        const { low, high } = dragged.lane.scale;
+        const by = ((event.clientY - dragged.y) / dragged.lane.plot.height) * (high - low);
+        dragged.y = event.clientY;
+        return set(dragged.lane, low + by, high + by);
+      }
       if (canvas.hasPointerCapture(event.pointerId)) return seek(event);
-      return point(timeAt(event));
+      const lane = axisAt(event);
+      canvas.style.cursor = lane ? "ns-resize" : "";
+      canvas.title = lane ? "Wheel: zoom this axis. Drag: move it. Double click: all of it" : "";
+      return point(lane ? null : at(event));
     });
+    canvas.addEventListener("pointerup", () => (dragged = null));
+    canvas.addEventListener("pointercancel", () => (dragged = null));
     canvas.addEventListener("pointerleave", () => point(null));
+    canvas.addEventListener("wheel", (event) => {
+      const lane = axisAt(event);
+      if (!lane || event.deltaY === 0) return;
+      event.preventDefault();
+      event.stopPropagation();
+      const { low, high } = lane.scale;
+      const here = high - Math.min(Math.max((event.offsetY - lane.plot.top) / lane.plot.height, 0), 1) * (high - low);
+      const factor = event.deltaY < 0 ? 0.8 : 1.25;
+      set(lane, here + factor * (low - here), here + factor * (high - here));
+    }, { passive: false });
+    canvas.addEventListener("dblclick", (event) => {
+      const lane = axisAt(event);
+      if (!lane) return;
+      lane.zoom = null;
+      panel.stale = true;
+      plots.draw();
+    });
   }
 
   // Beside the plots, or above them where they are below the scene: it covers none.
@@ -252,12 +307,19 @@
 
   plots.zoom = (from, to) => {
     nmm.player.setRange(from, to);
-    const { from: first, to: last } = nmm.player.range;
-    get("whole").disabled = get("wider").disabled = first === 0 && last === nmm.stage.duration;
     plots.redraw();
     changed();
   };
-  plots.whole = () => plots.zoom(0, nmm.stage.duration);
+  // Whether there is more to see than is seen.
+  function whole() {
+    const { from, to } = nmm.player.range;
+    get("wider").disabled = from === 0 && to === nmm.stage.duration;
+    get("whole").disabled = get("wider").disabled && !plots.panels.some(({ lanes }) => lanes.some(({ zoom }) => zoom));
+  }
+  plots.whole = () => {
+    for (const { lanes } of plots.panels) for (const lane of lanes) lane.zoom = null;
+    plots.zoom(0, nmm.stage.duration);
+  };
   plots.closer = (factor, at = nmm.player.time) => {
     const length = Math.min(span() * factor, nmm.stage.duration);
     const share = (Math.min(at, nmm.stage.duration) - nmm.player.range.from) / span();

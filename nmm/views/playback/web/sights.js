@@ -199,13 +199,13 @@
     p.fillText(figure.unit, right, bottom + 4);
     const unit = right - p.measureText(figure.unit).width - 5;
     for (const [low, high, f, c, upright] of [[x0, x1, fx, cx, true], [y0, y1, fy, cy, false]]) {
-      const step = nmm.curves.step(f * (high - low), 4);
+      const step = nmm.axes.step(f * (high - low), 4);
       for (let k = Math.ceil((f * low + c) / step); k * step <= f * high + c; k++) {
         const [x, y] = place([(k * step - c) / f, (k * step - c) / f]);
         if (upright) stroke(k === 0 ? zero : line, 1, [[x, TOP], [x, bottom]]);
         else stroke(k === 0 ? zero : line, 1, [[LEFT, y], [right, y]]);
         Object.assign(p, { textAlign: upright ? "center" : "right", textBaseline: upright ? "top" : "middle" });
-        const text = nmm.curves.number(k * step, step);
+        const text = nmm.axes.number(k * step, step);
         const half = 0.5 * p.measureText(text).width;
         if (upright) x + half < unit && p.fillText(text, x, bottom + 4);
         else if (y > TOP + 4 && y < bottom - 2) p.fillText(text, LEFT - 4, y);
