@@ -135,11 +135,6 @@ def _called(scenario: Scenario) -> str:
     return (scenario.parts.moved_by or scenario.parts.resolver.kind).upper()
 
 
-def _always_written(wanted: bool) -> None:
-    if wanted:
-        raise InputError("`nmm compare` always writes playback.html, with all runs in it", where="--html")
-
-
 @command
 def compare(
     scenario: ScenarioArgument,
@@ -154,7 +149,7 @@ def compare(
     of_robot: OfRobot,
     of_log: Annotated[AddedOptions, PlaceOfOptions("compare")],
     out: Annotated[Path | None, out_option("runs/<scenario>-compare")] = None,
-    html: Annotated[bool, typer.Option("--html", hidden=True, callback=_always_written)] = False,
+    html: Annotated[bool, typer.Option("--html", hidden=True)] = True,  # it always is written
     table: TableOption = None,
     ellipsoids: EllipsoidGroup,
     figures: Figures,

@@ -191,7 +191,6 @@ COMMANDS: list[tuple[list[str], list[str]]] = [
     (["compare", "given.yaml", "--resolvers", "rg,ej"], ["resolver.added_task", "expected 2 rows"]),
     (["compare", "given.yaml", "--resolvers", ","], ["--resolvers", "rg,pg"]),
     (["compare", "given.yaml", "--resolvers", "rg,pg,rg"], ["--resolvers", "rg is given twice"]),
-    (["compare", "given.yaml", "--html"], ["--html", "always writes playback.html"]),
     (["run", "given.yaml", "--port", "7001"], ["--port", "only with --play"]),
     (["run", "given.yaml", "--no-open"], ["--no-open", "only with --play"]),
     (["compare", "given.yaml", "--out", "theirs"], ["theirs", "not what this writes"]),

@@ -8,7 +8,6 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array
@@ -16,12 +15,13 @@ from nmm.control.functions.function import Function
 from nmm.control.functions.program import Program
 from nmm.control.functions.tasks.task import Stack, Task
 from nmm.model.robots.motion import Motion
-from nmm.model.robots.reach import first_tip, tips
+from nmm.model.robots.reach import first_tip
 from nmm.model.robots.robot import Robot
 from nmm.motion.shown_frame import shown_frame
 from nmm.plugins.live.session import Session
-from nmm.views.playback.drawing import Command, Drawing, segment
+from nmm.views.playback.drawing import Command, Drawing
 from nmm.views.playback.extent import robot_boxes
+from nmm.views.playback.frames import axes_length, frame_nodes
 from nmm.views.playback.html import HEIGHT, file_page, framed
 from nmm.views.playback.placements import joint_screw, position_and_quaternion
 from nmm.views.playback.rolling import Rolling
@@ -117,13 +117,13 @@ def viewer_scene(
     boxes = robot_boxes(robot, q[np.newaxis], wheels[np.newaxis])
     seen = np.zeros((0, 3)) if beside is None else points_beside(beside, boxes)
     commands, drawn = live_scene(robot, q, wheels, title=robot.name, room=1.0, seen=seen)
-    length = float(np.clip(0.08 * np.linalg.norm(np.ptp(boxes[0], axis=0)), 0.02, 0.25))
+    length = axes_length(boxes[0])
     drawing = Drawing()
     if beside is not None:
         draw_beside(drawing, beside, boxes, drawn)
     if task is not None:
         task.draw(drawing)
-    listed = list(_frames(robot, drawn, drawing))
+    listed = list(frame_nodes(robot, drawn, drawing))
     drawing.add("joints", coordinates=list(_coordinates(robot, drawn, q)))
     pose = first_tip(robot) or next((frame["name"] for frame in listed if frame["shown"]), "")
     drawing.add("frames", frames=listed, shown=frames, length=length, pose=pose)
@@ -163,46 +163,6 @@ def _coordinates(robot: Robot, drawn: DrawnRobot, q: Array) -> Iterator[dict[str
             "linear": linear.tolist(),
             "angular": angular.tolist(),
         }
-
-
-def _frames(robot: Robot, drawn: DrawnRobot, drawing: Drawing) -> Iterator[dict[str, Any]]:
-    """Frames that a task may name: the node of each, and whether it is shown at first."""
-    model = robot.display_model
-    ends = set(tips(robot))
-    links = list(_joint_links(robot))
-    chosen, named = {*links, *ends}, {links[0], *ends}
-    for i, name in enumerate(robot.frames):
-        frame = _frame(model, name)
-        if frame is None or name in robot.platform.coordinates[:2]:
-            continue  # x and y are steps on the way to the root
-        parent = drawn.paths[frame.parentJoint - 1] if frame.parentJoint else drawn.paths[0].rsplit("/", 1)[0]
-        path = f"{parent}/frame {i} {segment(name)}"
-        drawing.transform(path, np.array(frame.placement.homogeneous))
-        yield {"name": name, "path": path, "shown": name in chosen, "named": name in named}
-
-
-def _frame(model: pin.Model, name: str) -> pin.Frame | None:
-    """The display model's frame of that name, chosen as by `Robot.frame_id`."""
-    for kind in (pin.FrameType.BODY, pin.FrameType.OP_FRAME):
-        if model.existFrame(name, kind):
-            return model.frames[model.getFrameId(name, kind)]
-    return model.frames[model.getFrameId(name)] if model.existFrame(name) else None
-
-
-def _joint_links(robot: Robot) -> Iterator[str]:
-    """The root link and the link below each joint, or the joint's own frame where there is no link."""
-    model, n_p = robot.model, robot.platform.n_p
-    root = model.getJointId("theta") if n_p else 0
-    joints = [root, *(model.getJointId(name) for name in robot.q_names[3 if n_p else 0 :])]
-    for joint in joints:
-        links = [
-            frame.name
-            for frame in model.frames
-            if frame.parentJoint == joint
-            and frame.type == pin.FrameType.BODY
-            and (joint == root or frame.placement.isIdentity(1e-9))
-        ]
-        yield links[0] if links else str(model.names[joint])
 
 
 def asked_for(scenario: Scenario, robot: Robot) -> Motion:

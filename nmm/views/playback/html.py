@@ -21,7 +21,8 @@ HEIGHT = 600
 #: In the order in which they depend on one another.
 _NAMES = (
     "commands elements theme runs legend scenery texts ghosts rooms ellipsoids obstacles sights apart "
-    "camera axes curves plots own_plots values facts player film webm record keys embedded address start"
+    "camera axes curves plots own_plots values facts player triads measure film webm record keys embedded "
+    "address start"
 )
 SCRIPTS = tuple(f"{name}.js" for name in _NAMES.split())
 

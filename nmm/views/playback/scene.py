@@ -21,6 +21,7 @@ from nmm.views.playback import extent
 from nmm.views.playback.cameras import draw_cameras, seen_points, tell_cameras
 from nmm.views.playback.channels import channels, draw_curves, draw_facts
 from nmm.views.playback.drawing import Command, Drawing, Rgb, packed
+from nmm.views.playback.frames import axes_length, frame_nodes
 from nmm.views.playback.keyframes import (
     MOST_FRAMES,
     Keyframes,
@@ -130,6 +131,8 @@ def playback_scene(
         # Unlabelled, the page attributes the line to the end-effector.
         label = look.name or ("" if motion.driven is not None else motion.robot.name)
         drawing.add("motion", path=path, root=robot.root, label=label, color=list(color), tag=tag)
+        nodes = list(frame_nodes(motion.robot, robot, drawing, every=False))
+        drawing.add("triads", frames=nodes, length=axes_length(boxes[i][0]))
         drawn = samples_kept(motion.t, fps)
         for name, points, thick in (
             ("path", motion.driven, 1.0),

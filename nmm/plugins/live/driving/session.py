@@ -349,7 +349,7 @@ class DriveSession(RobotSession):
         if self._making is not None:
             parts.append("another controller is being made")
         if self.clock.lost:
-            parts.append(f"{self.clock.lost} pictures late")
+            parts.append(f"{self.clock.lost / FPS:.1f} s of real time skipped: the machine was busy")
         return ", ".join(parts), False
 
 

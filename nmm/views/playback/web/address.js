@@ -17,6 +17,7 @@
     if (camera.moved) parts.push(`camera=${camera.place().map((x) => Number(x.toPrecision(6))).join(",")}`);
     if (nmm.apart.share > 0) parts.push(`apart=${Number(nmm.apart.share.toFixed(3))}`);
     for (const part of SHOWN) if (!pressed(part)) parts.push(`${part}=off`);
+    if (pressed("axes")) parts.push("axes=on");
     const hidden = nmm.runs.filter((run) => run.hidden).map((run) => encodeURIComponent(run.id));
     if (hidden.length) parts.push(`hide=${hidden.join(",")}`);
     const open = plots.shown ? plots.opened() : ["none"];
@@ -55,7 +56,7 @@
     if (wanted.has("view")) camera.look(wanted.get("view"));
     if (wanted.has("follow") && !camera.following) nmm.actions.follow();
     if (wanted.has("apart") && runs.length > 1) nmm.apart.set(Number(wanted.get("apart")));
-    for (const part of SHOWN) {
+    for (const part of [...SHOWN, "axes"]) {
       const asked = wanted.get(part);
       if (["on", "off"].includes(asked) && (asked === "on") !== pressed(part)) nmm.actions[part]();
     }

@@ -149,8 +149,8 @@
   function thinned() {
     const [drawn, all] = ["t", "samples"].map((key) => nmm.runs.map((run) => (key === "t" ? run.t.length : run.samples)));
     if (drawn.every((count, i) => count === all[i])) return;
-    const told = (counts) => [...new Set(counts)].map((count) => count.toLocaleString("en")).join(", ");
-    get("thinned").textContent = `Drawn from ${told(drawn)} of ${told(all)} samples; extremes and events are kept.`;
+    const told = (counts) => [...new Set([Math.min(...counts), Math.max(...counts)])].map((count) => count.toLocaleString("en")).join(" to ");
+    get("thinned").textContent = `Drawn from ${told(drawn)} of ${told(all)} samples, extremes and events among them.`;
   }
 
   plots.build = (panels) => {

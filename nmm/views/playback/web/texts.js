@@ -1,5 +1,5 @@
 // The texts over the scene: each right above its point, moved aside or upwards where another one has the room. Names of
-// robots come first, then distances, names of obstacles, the times of the robot's copies, and names of axes, which are
+// robots come first, then distances, names of obstacles, of frames, the times of the robot's copies, and names of axes, which are
 // at the axes' ends or nowhere.
 "use strict";
 {
@@ -8,7 +8,7 @@
   const [ROWS, ASIDE] = [[0, 1, -1, 2, -2, 3, -3, 4, 5, 6], [0, -1, 1, -2, 2]];
   const STACK = [0, 1, 2, 3, 4, 5, 6, 7, -1, -2, -3];
   const COLORS = { light: [0.31, 0.38, 0.46], dark: [0.72, 0.78, 0.85] };
-  const RANKS = ["robot", "distance", "obstacle", "time", "axis"];
+  const RANKS = ["robot", "distance", "obstacle", "frame", "time", "axis"];
   const AXIS = RANKS.indexOf("axis");
   const view = document.getElementById("view");
   // before: what else is to be done before each picture, with the eye.
@@ -43,7 +43,7 @@
   // The nearest free place: above the point, beside that, or rows higher or lower.
   function free(taken, { x, y, wide, high, rank }, width) {
     // Names of robots are stacked.
-    for (const row of [STACK, ROWS, ROWS, ROWS, [0]][rank]) {
+    for (const row of [STACK, ROWS, ROWS, ROWS, ROWS, [0]][rank]) {
       for (const aside of rank % AXIS ? ASIDE : [0]) {
         const above = rank === AXIS ? -0.5 * high : ABOVE;
         const [left, top] = [x - 0.5 * wide + aside * (wide + GAP + 1), y - above - high - row * (high + 1)];

@@ -3,35 +3,10 @@
 {
   const THREE = MeshCat.THREE;
   const DEGREES = 180 / Math.PI;
-  const COLORS = [[0.84, 0.2, 0.18], [0.16, 0.6, 0.24], [0.16, 0.38, 0.86]];
   // MeshCat turns the scene: three.js has y upwards, robots have z.
   const UPRIGHT = new THREE.Matrix4().set(1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1);
   const frames = (nmm.frames = { list: [], shown: true });
-  let parts = null;
-
-  // What all triads are made of: solid where one sees them, faint where something is before them.
-  function prepared(length) {
-    const shaft = new THREE.CylinderGeometry(0.035 * length, 0.035 * length, length, 10);
-    shaft.translate(0, 0.5 * length, 0);
-    return COLORS.map((rgb, axis) => {
-      const along = shaft.clone();
-      if (axis === 0) along.rotateZ(-Math.PI / 2);
-      if (axis === 2) along.rotateX(Math.PI / 2);
-      const color = nmm.color(rgb);
-      const faint = { color, transparent: true, opacity: 0.4, depthTest: false, depthWrite: false };
-      return [along, new THREE.MeshBasicMaterial({ color }), new THREE.MeshBasicMaterial(faint)];
-    });
-  }
-
-  function triad() {
-    const group = new THREE.Group();
-    for (const [geometry, solid, faint] of parts) {
-      const before = new THREE.Mesh(geometry, faint);
-      before.renderOrder = 900;
-      group.add(new THREE.Mesh(geometry, solid), before);
-    }
-    return group;
-  }
+  let triad = null;
 
   function draw(frame) {
     const on = frames.shown && frame.shown;
@@ -132,7 +107,7 @@
   nmm.hooks.frames = ({ frames: list, shown, length, pose }) => {
     frames.list = list.map((frame) => ({ ...frame, first: frame.shown, triad: null }));
     frames.shown = shown;
-    parts = prepared(length);
+    triad = nmm.triad(length);
     posePart(pose);
     listPart();
     toggle("triads", "Frames", "Show the frames that are ticked", shown, (on) => {
