@@ -29,6 +29,9 @@ def summary_rows(
     if len(trajectory):
         outcome += f", {trajectory.t[-1]:g} s in {len(trajectory)} samples"
     yield "outcome", outcome
+    if trajectory.resolver == "plan" and trajectory.robot.platform.n_p:
+        x, y, theta = np.diff(trajectory.q[:, :3], axis=0).T
+        yield "way", f"{np.hypot(x, y).sum():.3g} m, with turns of {np.abs(theta).sum():.3g} rad"
     redundancy = numbers["redundancy"]
     left = max(redundancy["kinematic"], 0) or "none left"
     yield "redundancy", f"kinematic {left}, static {max(redundancy['static'], 0)}"

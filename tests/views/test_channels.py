@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -11,11 +12,15 @@ import pytest
 from figure_examples import cut, run
 from playback_robot import drive, hand_built_robot
 
+import nmm
 from nmm.base.errors import InputError
+from nmm.base.resolver_style import looks
+from nmm.motion.table import summary_rows
 from nmm.motion.trajectory import Trajectory
 from nmm.scenario import Scenario
 from nmm.views.playback import write_html
-from nmm.views.playback.channels import FPS, SEEN, Channel, channels
+from nmm.views.playback.channels import FPS, SEEN, Channel, channels, draw_curves
+from nmm.views.playback.drawing import Drawing
 from nmm.views.playback.keyframes import MOST_FRAMES
 
 
@@ -139,3 +144,23 @@ def test_no_samples_are_refused_in_words(tmp_path: Path) -> None:
         write_html([cut(run("unicycle_2r_position"), 0)], tmp_path / "page.html")
     with pytest.raises(InputError, match="at least one motion"):
         write_html([], tmp_path / "page.html")
+
+
+def test_a_plans_page_opens_with_the_plan() -> None:
+    """What is spare, limits and inputs; not the error of a task that it does not follow."""
+    robot = nmm.load("unicycle_3r")
+    limits = nmm.Limits(velocity={"platform": 1.0, "arm": 1.0}, acceleration=2.0)
+    pillar = nmm.Obstacle(nmm.Box([0.4, 0.4, 1.0]), [1.5, 0.0, 0.5], name="pillar")
+    plan = nmm.plan(robot, robot.rest, {"x": 3.0, "y": 0.0, "theta": 0.0}, [pillar], limits=limits)
+    trajectory = plan.trajectory(0.05)
+    drawing = Drawing()
+    draw_curves(drawing, [channels(trajectory)], looks(["PLAN"]), 0.0)
+    panels = drawing.commands[0]["panels"]
+    assert [panel["id"] for panel in panels[:3]] == ["clearance", "margin", "inputs"]
+    assert [panel["open"] for panel in panels] == [True] * 3 + [False] * (len(panels) - 3)
+    way = dict(summary_rows(trajectory, trajectory.summary()))["way"]
+    metres, turns = (float(part) for part in re.findall(r"[\d.]+", way))
+    x, y, theta = trajectory.q[:, :3].T
+    assert metres == pytest.approx(np.hypot(np.diff(x), np.diff(y)).sum(), rel=5e-3)
+    assert metres > 2.0
+    assert turns == pytest.approx(np.abs(np.diff(theta)).sum(), rel=5e-3)

@@ -35,6 +35,8 @@ LENGTHS: Mapping[str, list[int]] = dict(zip(DASHES, ([], [7, 4], [9, 3, 2, 3], [
 STILL = 1e-6
 
 
+#: The panels that tell of a plan: what is spare, and what it asks of the robot.
+OF_PLANS = ("clearance", "margin", "inputs")
 #: The panel of what is not recorded, but follows from the motion.
 TORQUES = Curve("torques", "Torques", 13)
 
@@ -57,12 +59,14 @@ class Channel:
 @dataclass(frozen=True, eq=False)
 class Channels:
     """A run's channels at the K of its `samples` that a page holds, t (K,) s; `partitions` names RG's
-    partitions by their numbers in the channel "partition"."""
+    partitions by their numbers in the channel "partition"; `plan`: whether it is a plan, for which no task is
+    followed."""
 
     t: Array
     samples: int
     channels: tuple[Channel, ...]
     partitions: tuple[str, ...] = ()
+    plan: bool = False
 
 
 def channels(run: Trajectory | Motion) -> Channels:
@@ -80,7 +84,8 @@ def channels(run: Trajectory | Motion) -> Channels:
     values = [np.where(np.isfinite(channel.values), channel.values, np.nan) for channel in plotted]
     samples = _kept(run.t, values, events)
     thinned = (replace(channel, values=x[samples]) for channel, x in zip(plotted, values, strict=True))
-    return Channels(run.t[samples], len(run.t), tuple(thinned), partitions)
+    plan = isinstance(run, Trajectory) and run.resolver == "plan"
+    return Channels(run.t[samples], len(run.t), tuple(thinned), partitions, plan)
 
 
 def live_channels(
@@ -253,11 +258,19 @@ def draw_curves(drawing: Drawing, runs: Sequence[Channels], looks: Sequence[RunS
         worn = {"name": look.name, "color": look.color, "dash": dash}
         data.append({"t": packed(run.t - start, np.float64), **own, **worn})
     used = {lane["panel"] for lane in lanes.values()}
+    plans = all(run.plan for run in runs)
+
+    def place(curve: Curve) -> tuple[int, int]:
+        first = plans and curve.panel in OF_PLANS
+        return OF_PLANS.index(curve.panel) if first else len(OF_PLANS), curve.place
+
     panels = [
-        {"id": curve.panel, "title": curve.title, "open": _opens(curve, runs)}
-        for curve in sorted(
-            filter(None, [*(quantity.curve for quantity in placed()), TORQUES]), key=lambda x: x.place
-        )
+        {
+            "id": curve.panel,
+            "title": curve.title,
+            "open": curve.panel in OF_PLANS if plans else _opens(curve, runs),
+        }
+        for curve in sorted(filter(None, [*(quantity.curve for quantity in placed()), TORQUES]), key=place)
         if curve.panel in used
     ]
     drawing.add("curves", panels=panels, lanes=list(lanes.values()), runs=data)
