@@ -35,6 +35,7 @@ SEEN = """() => {
 def test_frames_of_links_and_tools_are_shown_where_they_are(tmp_path: Path, window: Window) -> None:
     motion = run("unicycle_2r_position", "rg", duration=2.0)
     page = window.open(file_url([motion], tmp_path))  # type: ignore[list-item]
+    assert "platform's path" in (page.locator("#legend").text_content() or "")  # the thin line
     assert page.evaluate(SEEN) == []
     page.keyboard.press("t")
     seen = {path.rsplit("/", 1)[1].split(" ", 2)[2]: path for path in page.evaluate(SEEN)}
@@ -112,3 +113,16 @@ def test_a_robot_is_measured_where_it_is_seen(small_robot: Robot, tmp_path: Path
     ((x, y, z),) = page.evaluate(ENDS)
     assert z > 0.02
     assert np.hypot(x - top[0], y - top[1]) < 0.3
+
+
+def test_the_worlds_axes_are_seen_through_what_stands_before_them(
+    small_robot: Robot, tmp_path: Path, window: Window
+) -> None:
+    page = window.open(file_url([drive(small_robot)], tmp_path))
+    arrows = """() => {
+      const over = [];
+      const through = (part) => part.isMesh && !part.material.depthTest;
+      nmm.node("/nmm/axes").traverse((part) => through(part) && over.push(part.renderOrder));
+      return over;
+    }"""
+    assert page.evaluate(arrows) == [900] * 6

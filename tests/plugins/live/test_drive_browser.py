@@ -421,6 +421,23 @@ def test_a_target_out_of_reach_is_said_in_words_and_taken_back(window: Window, s
         assert told.inner_text().startswith("t = ")
 
 
+#: Directions of a target far away, rad, whose arrow would cover tools or heading.
+COVERED = """() => {
+  const target = { heading: "far", gizmo: { place: { x: 0, y: 0, z: 0 } } };
+  const over = (a, b) => a.left < b.right && a.right > b.left && a.top < b.bottom && a.bottom > b.top;
+  const cards = ["tools", "heading"].map((id) => document.getElementById(id).getBoundingClientRect());
+  const covered = [];
+  for (let angle = 0; angle < 6.28; angle += 0.05) {
+    Object.assign(target.gizmo.place, { x: 40 * Math.cos(angle), y: 40 * Math.sin(angle) });
+    nmm.border.update([target]);
+    const arrow = [...document.querySelectorAll(".away")].at(-1);
+    if (cards.some((card) => card.width && over(arrow.getBoundingClientRect(), card))) covered.push(angle);
+  }
+  [...document.querySelectorAll(".away")].at(-1).remove();
+  return covered;
+}"""
+
+
 def test_a_target_out_of_the_picture_has_an_arrow_and_comes_back(
     window: Window, setup: ScenarioSetup
 ) -> None:
@@ -444,6 +461,8 @@ def test_a_target_out_of_the_picture_has_an_arrow_and_comes_back(
             assert view["left"] <= at["x"] <= view["right"] - at["width"]
             assert view["top"] <= at["y"] <= view["bottom"] - at["height"]
             assert (at["x"] + 0.5 * at["width"] > 0.5 * view["right"]) is (x == "40")
+        # Wherever it points, it covers nothing that one presses.
+        assert page.evaluate(COVERED) == []
         arrow.click()
         arrow.wait_for(state="hidden")
         page.keyboard.press("t")

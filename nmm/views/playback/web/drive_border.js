@@ -24,6 +24,16 @@
     return { x: behind ? -x : x, y: behind ? -y : y, out: behind || Math.max(Math.abs(x), Math.abs(y)) > 1 };
   }
 
+  // Below what lies over the view's upper half, or above what lies over its lower one.
+  function clear(x, y) {
+    for (const id of ["heading", "tools", "status", "bar"]) {
+      const card = document.getElementById(id).getBoundingClientRect();
+      if (x < card.left - EDGE || x > card.right + EDGE || y < card.top - EDGE || y > card.bottom + EDGE) continue;
+      if (card.width) y = card.top < 0.5 * view.clientHeight ? card.bottom + EDGE : card.top - EDGE;
+    }
+    return [x, y];
+  }
+
   border.update = (targets) => {
     for (const target of targets) {
       if (!target.gizmo) continue;
@@ -35,7 +45,7 @@
       const { left, top, width, height } = view.getBoundingClientRect();
       const [across, up] = [0.5 * width * x, 0.5 * height * y];
       const share = Math.min((0.5 * width - EDGE) / Math.abs(across), (0.5 * height - EDGE) / Math.abs(up));
-      const [px, py] = [left + 0.5 * width + share * across, top + 0.5 * height - share * up];
+      const [px, py] = clear(left + 0.5 * width + share * across, top + 0.5 * height - share * up);
       button.style.transform = `translate(${px.toFixed(1)}px, ${py.toFixed(1)}px) rotate(${Math.atan2(-up, across).toFixed(3)}rad)`;
     }
   };

@@ -4,6 +4,7 @@
   const list = document.getElementById("legend");
   const SIGNS = {
     line: '<path d="M2 6h20" stroke="currentColor" stroke-width="4" stroke-linecap="round"/>',
+    thin: '<path d="M2 6h20" stroke="currentColor" stroke-width="1.6" stroke-linecap="round"/>',
     dashed: '<path d="M1 6h22" stroke="currentColor" stroke-width="3" stroke-dasharray="6 4"/>',
     box: '<path d="M5 1h14v10H5z" fill="currentColor"/>',
     grid: '<path d="M2 3.5h20M2 8.5h20M8 0v12M16 0v12" stroke="currentColor"/>',

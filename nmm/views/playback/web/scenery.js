@@ -4,7 +4,7 @@
   const THREE = MeshCat.THREE;
   const SIDES = 8;
   const PAPER = new THREE.Color(1, 1, 1);
-  const scenery = (nmm.scenery = { trails: [], desired: [] });
+  const scenery = (nmm.scenery = { trails: [], desired: [], thin: false });
 
   function add(path, object) {
     nmm.viewer.set_object(nmm.split(path), object);
@@ -134,6 +134,14 @@
       tag.position.y = 1.1 * length;
       const arrow = new THREE.Group();
       arrow.add(shaft, head, tag);
+      // Faint where something is before it.
+      const faint = new THREE.MeshBasicMaterial({ color: nmm.color(rgb), transparent: true, opacity: 0.35, depthTest: false, depthWrite: false });
+      for (const part of [shaft, head]) {
+        const before = new THREE.Mesh(part.geometry, faint);
+        before.position.copy(part.position);
+        before.renderOrder = 900;
+        arrow.add(before);
+      }
       if (axis === 0) arrow.rotation.z = -Math.PI / 2;
       if (axis === 2) arrow.rotation.x = Math.PI / 2;
       group.add(arrow);
@@ -280,6 +288,7 @@
       nmm.theme.listeners.push(themed);
       group.add(new THREE.Mesh(faint, ahead), new THREE.Mesh(driven, material(color, 1)));
       scenery.trails.push({ geometry: driven, when });
+      scenery.thin ||= thick < 1;
     }
     scenery.paths = (scenery.paths || []).concat(group);
     if (times === null) scenery.desired.push(group);
