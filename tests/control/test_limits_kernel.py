@@ -45,7 +45,7 @@ def test_the_point_is_a_quadratic_programs(kind: str) -> None:
 def test_limits_hold_and_the_task_is_scaled(kind: str) -> None:
     for example, found in some(kind):
         asked = found.scale * (example.J @ example.target)
-        assert violation(example, found.u) <= 1e-11
+        assert violation(example.at(found.scale), found.u) <= 1e-11
         assert np.abs(example.J @ found.u - asked).max() <= 1e-10 * (1.0 + np.abs(asked).max())
 
 
@@ -93,7 +93,7 @@ def test_beside_a_singularity_limits_hold_and_the_task_is_scaled(
         found = ProjectedGradient(1.0).resolve(Problem(**given, u_lower=-u_upper, u_upper=u_upper))
         assert found.status is Status.RELAXED
         target = np.linalg.lstsq(J, rate, rcond=None)[0]
-        example = Example("near singular", J, np.eye(m), -u_upper, u_upper, target)
+        example = Example("near singular", J, np.eye(m), -u_upper, u_upper, target, np.zeros(m))
         assert abs(found.nu[0] - largest_scale(example)) <= 1e-7
         assert np.all(np.abs(found.u) <= u_upper)
         assert np.linalg.norm(J @ found.u - found.nu[0] * rate) <= 1e-9 * (1.0 + np.linalg.norm(rate))

@@ -21,11 +21,11 @@ from nmm.base.kernels.active_set import ConstraintRows, nearest_within
 
 #: Rows of the task, inputs, rows of limits.
 SIZES = ((2, 4, 4), (3, 5, 5), (6, 10, 10), (6, 10, 18), (6, 18, 40))
-KINDS = ("plain", "degenerate", "near singular", "outside", "empty")
+KINDS = ("plain", "degenerate", "near singular", "outside", "yielding", "empty")
 
 
 class Example(NamedTuple):
-    """J u = λ J target, lower <= G u <= upper."""
+    """J u = λ J target, lower - (1 - λ) give <= G u <= upper + (1 - λ) give."""
 
     kind: str
     J: np.ndarray
@@ -33,12 +33,17 @@ class Example(NamedTuple):
     lower: np.ndarray
     upper: np.ndarray
     target: np.ndarray
+    give: np.ndarray
+
+    def at(self, scale: float) -> Example:
+        """The limits at a scale, as what does not give."""
+        more = (1.0 - scale) * self.give
+        return self._replace(lower=self.lower - more, upper=self.upper + more, give=0.0 * self.give)
 
     @property
     def rows(self) -> ConstraintRows:
-        s, c = len(self.J), len(self.G)
         return ConstraintRows(
-            self.J, np.zeros(s), self.J @ self.target, self.G, self.lower, self.upper, np.zeros(c)
+            self.J, np.zeros(len(self.J)), self.J @ self.target, self.G, self.lower, self.upper, self.give
         )
 
 
@@ -73,7 +78,8 @@ def examples(count: int, seed: int = 0) -> Iterator[Example]:
         u = np.linalg.lstsq(J, rate, rcond=None)[0] + rng.choice([0.0, 0.3]) * rng.normal(size=m)
         if kind != "empty":  # from a point within the limits
             lower, upper, u = lower - G @ inside, upper - G @ inside, u - inside
-        yield Example(kind, J, np.ascontiguousarray(G), lower, upper, u)
+        give = rng.uniform(0.0, 1.0, len(G)) if kind == "yielding" else np.zeros(len(G))
+        yield Example(kind, J, np.ascontiguousarray(G), lower, upper, u, give)
 
 
 def solved(example: Example, active: np.ndarray | None = None) -> Found:
@@ -85,13 +91,12 @@ def solved(example: Example, active: np.ndarray | None = None) -> Found:
 def largest_scale(example: Example) -> float:
     """λ by a linear program; not a number where there is none."""
     s, m = example.J.shape
-    c = len(example.G)
-    finite = np.isfinite(example.upper)
-    above = np.hstack([example.G[finite], np.zeros((finite.sum(), 1))])
+    finite, give = np.isfinite(example.upper), example.give[:, None]
+    above = np.hstack([example.G[finite], give[finite]])
     result = linprog(
         np.append(np.zeros(m), -1.0),
-        A_ub=np.vstack([above, np.hstack([-example.G, np.zeros((c, 1))])]),
-        b_ub=np.concatenate([example.upper[finite], -example.lower]),
+        A_ub=np.vstack([above, np.hstack([-example.G, give])]),
+        b_ub=np.concatenate([(example.upper + example.give)[finite], example.give - example.lower]),
         A_eq=np.hstack([example.J, -(example.J @ example.target)[:, None]]),
         b_eq=np.zeros(s),
         bounds=[(None, None)] * m + [(0.0, 1.0)],
@@ -159,7 +164,7 @@ def main(count: int) -> None:
         new = (
             abs(found.scale - expected),
             max(apart, pull(example, found)),
-            violation(example, found.u),
+            violation(example.at(found.scale), found.u),
             missed,
         )
         worst[example.kind] = tuple(map(max, worst[example.kind], new))  # type: ignore[assignment]  # as many as before

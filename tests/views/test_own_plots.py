@@ -83,9 +83,7 @@ def test_quantities_of_ones_choice_share_a_plot(page: Page, runs: list[Trajector
     assert told(panel) == pytest.approx([*wanted["q1"], *wanted["u_omega"]], rel=1e-3)
     # A press seeks, as in the other plots.
     left, top = on_canvas(panel)
-    page.mouse.click(
-        left + page.evaluate("nmm.lanes.length && nmm.plots.panels.at(-1).lanes[0].plot.x(4)"), top + 40
-    )
+    page.mouse.click(left + page.evaluate(f"{LANE}.plot.x(4)"), top + 40)
     assert page.evaluate("nmm.state().t") == pytest.approx(4.0, abs=0.02)
     # Out again: a quantity, a run, the plot.
     panel.get_by_role("button", name="q₁ ×").click()
@@ -103,9 +101,7 @@ def test_a_quantity_over_another_has_the_clock_on_its_curve(page: Page, runs: li
     panel.get_by_label("Over", exact=True).select_option("x")
     assert panel.locator("summary").inner_text().startswith("y [m] over x [m]")
     left, top = on_canvas(panel)
-    place = (
-        "([x, y]) => { const { plot } = nmm.plots.panels.at(-1).lanes[0]; return [plot.x(x), plot.y(y)]; }"
-    )
+    place = f"([x, y]) => [{LANE}.plot.x(x), {LANE}.plot.y(y)]"
     for t in (0.0, 1.7, 5.2):
         page.evaluate(f"nmm.seek({t})")
         wanted = values(runs, t)
@@ -140,6 +136,12 @@ def test_the_address_has_the_plots(page: Page) -> None:
     page.wait_for_function("nmm.own.text().join() === 'plot=u_v'")
 
 
+#: Of a wheel, 3,000 times at a place.
+TURN = """([clientX, clientY, deltaY]) => {
+  const canvas = document.querySelector("[data-panel=inputs] canvas");
+  const turn = () => new WheelEvent("wheel", { clientX, clientY, deltaY, cancelable: true });
+  for (let k = 0; k < 3000; k++) canvas.dispatchEvent(turn());
+}"""
 AXIS = "nmm.lanes.find(({ key }) => key === 'u_v').scale"
 
 
@@ -171,6 +173,13 @@ def test_a_wheel_over_its_numbers_zooms_an_axis(page: Page) -> None:
     page.mouse.dblclick(box["x"] + 20, y)
     assert page.evaluate(AXIS) == whole
     assert page.locator("#whole").is_disabled()
+    # However long one turns the wheel, in or out, the axis has numbers.
+    for turned in (-100, 100):
+        page.evaluate(TURN, [box["x"] + 20, y, turned])
+        ends = page.evaluate(AXIS)
+        assert 0.0 < ends["high"] - ends["low"] < 1e251
+        page.mouse.dblclick(box["x"] + 20, y)
+        assert page.evaluate(AXIS) == whole
     # All axes at once, as they were.
     page.mouse.wheel(0, -100)
     page.wait_for_function(f"{AXIS}.high < {whole['high']!r}")

@@ -64,7 +64,7 @@
       const hidden = words(wanted.get("hide"));
       for (const run of runs) nmm.hide(run, hidden.includes(run.id));
     }
-    nmm.own.read(wanted.getAll("plot"));
+    if (wanted.has("plot")) nmm.own.read(wanted.getAll("plot"));
     if (wanted.has("plots")) {
       const named = words(wanted.get("plots"));
       const known = plots.ids().filter((id) => named.includes(id.toLowerCase()));

@@ -65,6 +65,9 @@
     return { log: false, low: low - (never && low === 0 ? 0.5 * room : room), high: high + room, limits: [...limits], ...zoom };
   };
 
+  // Whether numbers tell the ends of an axis from each other.
+  axes.told = (low, high) => high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high), 1e-250) && high - low < 1e250;
+
   // The least of 1, 2, 4 or 5 times a power of ten of which no more than `most` lie between two values: that
   // leaves at least two of them, for `most` of 3 or more.
   function between(low, high, most) {

@@ -118,9 +118,9 @@
     if (lane.key === "partition") return band(pen, lane, upper, about);
     const traces = curves.traces(lane);
     const scale = axes.over(seenOf(traces, about.range), lane.log, lane.zoom);
-    const across = lane.over ? axes.over(seenOf(traces, about.range, lane.over), false, lane.zoomAcross) : null;
+    const across = lane.over ? axes.over(seenOf(traces, about.range, lane.over), false) : null;
     const nothing = scale.nothing || across?.nothing;
-    if (across && !nothing && lane.square) square(scale, across, height, right - curves.LEFT);
+    if (across && !nothing && lane.square && !scale.log && !lane.zoom) square(scale, across, height, right - curves.LEFT);
     const share = ({ low, high, log }, value) => ((log ? (value > 0 ? Math.log10(value) : NaN) : value) - low) / (high - low);
     const y = (value) => top + height * (1 - share(scale, value));
     const x = across ? (value) => curves.LEFT + (right - curves.LEFT) * share(across, value) : about.x;

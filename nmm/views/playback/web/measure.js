@@ -26,7 +26,10 @@
   const world = ({ x, y, z }) => new THREE.Vector3(x, -z, y);
 
   function draw() {
-    if (group) nmm.viewer.scene.remove(group);
+    if (group) {
+      nmm.viewer.scene.remove(group);
+      for (const { geometry, material } of group.children) [geometry, material].forEach((part) => part.dispose());
+    }
     group = null;
     if (measure.points.length) {
       const color = nmm.color(COLOR);
@@ -69,7 +72,9 @@
   // A drag turns the camera.
   view.addEventListener("pointerdown", (event) => (pressed = event.button === 0 ? event : null), true);
   view.addEventListener("pointerup", (event) => {
-    if (!measure.on || !pressed || Math.hypot(event.clientX - pressed.clientX, event.clientY - pressed.clientY) > STILL) return;
+    const from = pressed;
+    pressed = null;
+    if (!measure.on || !from || Math.hypot(event.clientX - from.clientX, event.clientY - from.clientY) > STILL) return;
     const point = hit(event);
     if (!point) return;
     measure.points = [...measure.points.slice(0, 2 * (measure.points.length < 2)), point];

@@ -34,6 +34,7 @@
     away.addEventListener("click", () => {
       plots.panels.splice(plots.panels.indexOf(panel), 1);
       panel.part.remove();
+      plots.draw();
       changed();
     });
     Object.assign(panel, { row, more, across, chips: [], dots: [] });
@@ -97,9 +98,10 @@
       lane.told.forEach(({ run, key }, i) => {
         const at = nmm.at(run, time);
         const [x, y] = [lane.over, key].map((name) => nmm.value(run, name, at));
-        dots[i].hidden = run.hidden || x === null || y === null || !lane.scale;
-        if (dots[i].hidden) return;
-        dots[i].style.transform = `translate(${lane.plot.x(x)}px, ${canvas.offsetTop + lane.plot.y(y)}px)`;
+        const [left, top] = lane.scale && x !== null && y !== null ? [lane.plot.x(x), lane.plot.y(y)] : [NaN, NaN];
+        const within = left >= nmm.curves.LEFT - 1 && left <= canvas.clientWidth && top >= lane.plot.top - 1 && top <= lane.plot.top + lane.plot.height + 1;
+        dots[i].hidden = run.hidden || !within;
+        if (within) dots[i].style.transform = `translate(${left}px, ${canvas.offsetTop + top}px)`;
       });
     }
   };

@@ -216,6 +216,7 @@
       return panel.lanes.find((lane) => lane.scale && event.offsetY >= lane.top && event.offsetY < lane.bottom) ?? null;
     };
     const set = (lane, low, high) => {
+      if (!nmm.axes.told(low, high)) return;
       lane.zoom = { low, high };
       panel.stale = true;
       plots.draw();
@@ -251,7 +252,7 @@
       event.stopPropagation();
       const { low, high } = lane.scale;
       const here = high - Math.min(Math.max((event.offsetY - lane.plot.top) / lane.plot.height, 0), 1) * (high - low);
-      const factor = event.deltaY < 0 ? 0.8 : 1.25;
+      const factor = 1.25 ** Math.min(Math.max(event.deltaY / 100, -1), 1); // a trackpad's events are many and small
       set(lane, here + factor * (low - here), here + factor * (high - here));
     }, { passive: false });
     canvas.addEventListener("dblclick", (event) => {
