@@ -20,6 +20,8 @@ RUNS, STEPS, DT, EVERY = 500, 200, 0.1, 10
 RADIUS, TRACK = 0.1, 0.5
 #: Variance of a wheel's turning for each rad; standard deviations of slip; of a fix in x and y, m, and theta.
 SPREAD, SLIP, FIX = 2e-3, np.array([0.01, 0.02, 0.02]), np.array([0.1, 0.1, 0.05])
+#: Of radii that drift: standard deviations of a wheel's scale at first, and of its walk, 1/√s.
+SCALE, WALK = 0.02, 0.004
 #: 95 % of means over the runs.
 BAND = chi2.ppf([0.025, 0.975], 3 * RUNS) / RUNS
 
@@ -86,13 +88,16 @@ class Extended:
         return np.einsum("ni,nij,nj->n", off, np.linalg.inv(self.P), off)
 
 
-def squared(pose: Array, P: Array, true: Array) -> float:
-    """Of the error of T_believed exp(eps) = T_true, by the inverse of the arc's formula."""
+def error(pose: Array, true: Array) -> Array:
+    """eps (3,) of T_believed exp(eps) = T_true, by the inverse of the arc's formula."""
     x, y, theta = true - pose
     c, s = np.cos(pose[2]), np.sin(pose[2])
     half = (np.remainder(theta + np.pi, 2 * np.pi) - np.pi) / 2
     ahead, aside, share = c * x + s * y, c * y - s * x, half / np.tan(half)
-    off = np.array([share * ahead + half * aside, share * aside - half * ahead, 2 * half])
+    return np.array([share * ahead + half * aside, share * aside - half * ahead, 2 * half])
+
+
+def squared(off: Array, P: Array) -> float:
     return float(off @ np.linalg.solve(P, off))
 
 
@@ -131,13 +136,13 @@ def means(name: str) -> tuple[Array, Array]:
             if k % EVERY == 0:
                 pose_filter.fix(fixes[k, run, : setting.rows], R, t)
                 ours[k // EVERY - 1, run] = squared(
-                    pose_filter.pose, pose_filter.state_covariance[:3, :3], true[k, run]
+                    error(pose_filter.pose, true[k, run]), pose_filter.state_covariance[:3, :3]
                 )
     return ours.mean(axis=1), np.array(theirs)
 
 
-def within(squares: Array) -> float:
-    return float(np.mean((squares > BAND[0]) & (squares < BAND[1])))
+def within(squares: Array, band: Array = BAND) -> float:
+    return float(np.mean((squares > band[0]) & (squares < band[1])))
 
 
 @pytest.mark.parametrize("name", SETTINGS)
@@ -158,3 +163,59 @@ def test_an_extended_filter_is_not_where_it_is_not_known_and_fixes_are_positions
     assert (theirs[:8] > BAND[1]).all()
     assert theirs.max() > 4 * BAND[1]
     assert within(ours[:8]) >= 7 / 8
+
+
+@cache
+def drifting(estimated: bool) -> tuple[Array, Array]:
+    """The mean normalised error squared after each fix, (fixes,), of wheels whose radii walk: of the pose and
+    the scales, 5 numbers, and of the scales alone; of the pose, and of nothing, for a filter that takes the
+    radii for known."""
+    rng = np.random.default_rng(11)
+    first, R = np.diag([0.05**2, 0.05**2, 0.1**2]), np.diag(FIX[:2] ** 2)
+    swing = 0.3 * np.sin(0.05 * np.arange(1, STEPS + 1))
+    counts = np.column_stack([1.0 - swing, 1.0 + swing])
+    robot, still = nmm.load("differential_base"), {"left_wheel_joint": 0.0, "right_wheel_joint": 0.0}
+    noise: dict[str, Any] = {"spread": SPREAD, "slip_noise": SLIP, "gate": None, "rate": 4 / DT}
+    if estimated:
+        noise |= {"scale_deviation": SCALE, "scale_walk": WALK}
+    every, of_scales = np.zeros((STEPS // EVERY, RUNS)), np.zeros((STEPS // EVERY, RUNS))
+    true = rng.standard_normal((RUNS, 3)) * np.sqrt(np.diag(first))
+    scales = SCALE * rng.standard_normal((RUNS, 2))
+    filters = [nmm.PoseFilter(robot, robot.rest, still, 0.0, covariance=first, **noise) for _ in range(RUNS)]
+    for k in range(1, STEPS + 1):
+        shaken = counts[k - 1] + np.sqrt(SPREAD * counts[k - 1]) * rng.standard_normal((RUNS, 2))
+        really = shaken * (1.0 + scales)
+        twist = np.column_stack(
+            [RADIUS * really.mean(1), np.zeros(RUNS), RADIUS * (really[:, 1] - really[:, 0]) / TRACK]
+        )
+        ways = [0.1, 0.1, 2 * RADIUS * abs(swing[k - 1]) / TRACK]
+        twist += SLIP * np.sqrt(ways) * rng.standard_normal((RUNS, 3))
+        true = true + turned(true[:, 2], moved(twist))
+        scales = scales + WALK * np.sqrt(DT) * rng.standard_normal((RUNS, 2))
+        fixes = true + FIX * rng.standard_normal((RUNS, 3))
+        for run, pose_filter in enumerate(filters):
+            pose_filter.step(DT * k, counts[k - 1])
+            if k % EVERY:
+                continue
+            pose_filter.fix(fixes[run, :2], R, DT * k)
+            P, off = pose_filter.state_covariance, error(pose_filter.pose, true[run])
+            if estimated:
+                unknown = [0, 1, 2, 4, 5]
+                off = np.append(off, 1.0 + scales[run] - [*pose_filter.scales.values()])
+                of_scales[k // EVERY - 1, run] = squared(off[3:], P[4:, 4:])
+                every[k // EVERY - 1, run] = squared(off, P[np.ix_(unknown, unknown)])
+            else:
+                every[k // EVERY - 1, run] = squared(off, P[:3, :3])
+    return every.mean(axis=1), of_scales.mean(axis=1)
+
+
+def test_radii_that_drift_are_as_far_off_as_it_says() -> None:
+    every, of_scales = drifting(True)
+    for squares, count in ((every, 5), (of_scales, 2)):
+        assert within(squares, chi2.ppf([0.025, 0.975], count * RUNS) / RUNS) >= 0.9, squares
+        assert abs(squares.mean() - count) < 0.05 * count
+
+
+def test_a_filter_that_takes_radii_for_known_is_too_sure() -> None:
+    every, _ = drifting(False)
+    assert (every[4:] > 1.2 * BAND[1]).all(), every
