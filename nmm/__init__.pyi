@@ -118,6 +118,7 @@ from .model.robots.loading import pinocchio_model as pinocchio_model
 from .model.robots.loading import pinocchio_models as pinocchio_models
 from .model.robots.robot import Robot as Robot
 from .motion.disturbances import Disturbances as Disturbances
+from .motion.localisation import Localisation as Localisation
 from .motion.simulation import simulate as simulate
 from .motion.trajectory import Outcome as Outcome
 from .motion.trajectory import Trajectory as Trajectory

@@ -55,6 +55,17 @@ class PlantController(Protocol):
     def step(self, t: float, q: ArrayLike, dt: float, method: str = "rk4") -> tuple[Array, Array]: ...
 
 
+class Believing(Protocol):
+    """What of a filter a plant needs: where a platform is believed to be, (3,), in place of its odometry.
+
+    begin : a run begins at q (n,)
+    go_on : the platform went from q to `ahead` (n,) in dt, s, while its inputs (p,) asked for so much (`by`)
+    """
+
+    def begin(self, q: Array) -> Array: ...
+    def go_on(self, q: Array, ahead: Array, by: Array, dt: float) -> Array: ...
+
+
 #: Samples that a plant has room for before it makes more.
 ROOM = 1024
 
@@ -230,6 +241,7 @@ class Plant:
     disturbed : what it does otherwise than it is told
     longer : makes disturbances of more samples, whose first ones are the same; for `step`
     samples : how many `step` has made
+    believing : what has the platform elsewhere than odometry has it; such a run is not compiled as a whole
 
     Examples
     --------
@@ -242,6 +254,7 @@ class Plant:
     disturbed: Disturbed = UNDISTURBED
     longer: Callable[[int], Disturbed] | None = None
     samples: int = 0
+    believing: Believing | None = None
 
     @property
     def disturbs(self) -> bool:
@@ -255,7 +268,7 @@ class Plant:
 
     @property
     def believed(self) -> Array | None:
-        """What the controller takes q for by odometry, (N, n); None where it is told."""
+        """What the controller takes q for by odometry or a filter, (N, n); None where it is told."""
         return self.disturbed.believed if len(self.disturbed.believed) else None
 
     def later(self, first: int) -> Plant:
@@ -268,6 +281,16 @@ class Plant:
         """A run begins at q (n,)."""
         if len(self.disturbed.believed):
             self.disturbed.believed[0] = q
+        if self.believing is not None:
+            self.disturbed.believed[0, :3] = self.believing.begin(q)
+
+    def _believe(self, k: int, q: Array, ahead: Array, dt: float) -> None:
+        """What is believed at sample k + 1, after the inputs that acted from sample k on."""
+        if self.believing is not None:
+            m = len(self.disturbed.slip)
+            u, u_dot = self.disturbed.asked[k, :m], self.disturbed.asked[k, m:]
+            by = dt * u + 0.5 * dt * dt * u_dot
+            self.disturbed.believed[k + 1, :3] = self.believing.go_on(q, ahead, by, dt)
 
     def seen(self, k: int | slice, q: Array) -> Array:
         """q (n,) or (K, n) at those samples, as the controller sees it."""
@@ -287,6 +310,7 @@ class Plant:
         """Where the disturbed robot comes to from q in dt, s, with what was asked for until sample k."""
         ahead = np.empty_like(q)
         checked_by_caller(act, ACT)(k, dt, q, *solver.blocks, self.disturbed, ahead)
+        self._believe(k, q, ahead, dt)
         return ahead
 
     def move(self, robot: Robot, k: int, q: Array, u: Array, u_dot: Array, dt: float) -> Array:
@@ -317,6 +341,7 @@ class Plant:
         """q (K, n) at times (K,), s, after the sample at q, with inputs u (m,) and rates u_dot (m,) from it
         on; the next sample is at the last of them."""
         ahead = [self.move(robot, self.samples, q, u, u_dot, float(dt)) for dt in times]
+        self._believe(self.samples, q, ahead[-1], float(times[-1]))
         self.samples += 1
         return np.array(ahead)
 

@@ -231,6 +231,6 @@ def compiled_loop(controller: Controller, plant: Plant, until: Goal | None) -> C
     """The loop of a controller that compiles as a whole, else None."""
     method = tableau(plant.integrator)
     plain = type(controller.solver.state) in (State, PartitionState) and type(until) in (Goal, type(None))
-    if method is None or not (plain and controller.solver.compiles_runs):
+    if method is None or plant.believing is not None or not (plain and controller.solver.compiles_runs):
         return None
     return CompiledLoop(controller, method, plant.disturbed, until)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,9 +11,10 @@ from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, counted, positive, scalar
 from nmm.base.errors import InputError, expect, expect_known
-from nmm.control.integrators import integrator
+from nmm.control.integrators import Integrator, integrator
 from nmm.control.plant import UNDISTURBED, Disturbed, Plant
 from nmm.model.robots.robot import Robot
+from nmm.motion.localisation import Localisation
 
 
 class Disturbances:
@@ -30,12 +32,15 @@ class Disturbances:
     creep : s; the platform slides to its left with creep v ω
     odometry : whether the controller sees the platform where its wheels' encoders have it, without slip and
         creep; recorded as `believed`
+    localisation : what it has beside encoders; the controller sees the platform where a filter of it all has
+        it, in place of odometry; none by default
     correct : s, after which odometry is put right each time; never when not given
     seed : of the noise
 
     Raises
     ------
-    InputError : a negative noise, numbers that are not finite, `correct` without odometry
+    InputError : a negative noise, numbers that are not finite, `correct` without odometry, or beside a
+        localisation
 
     Examples
     --------
@@ -55,6 +60,7 @@ class Disturbances:
         odometry: bool = False,
         correct: float | None = None,
         seed: int = 0,
+        localisation: Localisation | None = None,
     ) -> None:
         self.noise, self.slip = _numbers(noise, "noise"), _numbers(slip, "slip")
         for deviation in self.noise.values() if isinstance(self.noise, dict) else [self.noise]:
@@ -62,14 +68,19 @@ class Disturbances:
         self.delay, self.seed = counted(delay, "delay", 0), counted(seed, "seed", 0)
         self.creep, self.odometry = scalar(creep, "creep"), bool(odometry)
         self.correct = None if correct is None else positive(correct, "correct")
+        self.localisation = localisation
+        alone = localisation is None
+        expect(
+            alone or correct is None, "correct", "nothing beside a localisation, which puts it right", correct
+        )
         expect(self.odometry or correct is None, "correct", "nothing without odometry", correct)
 
     def on(self, robot: Robot, dt: float, count: int | None = None) -> Disturbing:
         """What disturbs one run of the robot, sampled every dt, s, or `count` runs, which may have slip of
         their own, (count, m); `InputError` for what the robot does not have."""
-        if robot.platform.n_p < 3 and (self.odometry or self.creep):
-            what = "odometry" if self.odometry else "creep"
-            raise InputError("odometry and creep are a mobile platform's", where=f"{what}: {robot.name}")
+        asked = {"odometry": self.odometry, "creep": self.creep, "localisation": self.localisation}
+        for name in (name for name, value in asked.items() if value and robot.platform.n_p < 3):
+            raise InputError("is a mobile platform's", where=f"{name}: {robot.name}")
         shape = (robot.n_u,) if count is None else (count, robot.n_u)
         slip = _each(self.slip, 1.0, robot.u_names, shape, "slip")
         return Disturbing(
@@ -77,9 +88,12 @@ class Disturbances:
             delay=self.delay,
             slip=slip.reshape(-1, robot.n_u),
             creep=self.creep,
-            odometry=self.odometry,
+            odometry=self.odometry or self.localisation is not None,
             correct=0 if self.correct is None else max(1, round(self.correct / dt)),
             seed=self.seed,
+            localisation=self.localisation,
+            robot=robot,
+            dt=dt,
         )
 
     def plant(self, robot: Robot, dt: float) -> Plant:
@@ -97,11 +111,13 @@ class Disturbances:
         True
         """
         disturbing = self.on(robot, dt)
-        return Plant(integrator("zoh", robot, 1e-9), disturbing.at(0, 1), lambda N: disturbing.at(0, N))
+        plant = disturbing.plant(integrator("zoh", robot, 1e-9), 0, 1)
+        return replace(plant, longer=lambda N: disturbing.at(0, N))
 
 
 class Disturbing(NamedTuple):
-    """Disturbances of B runs: noise (n,), slip (B, m), and what is the same in all; `correct` in samples."""
+    """Disturbances of B runs of a robot, sampled every dt, s: noise (n,), slip (B, m), and what all have in
+    common; `correct` in samples."""
 
     noise: Array
     delay: int
@@ -110,6 +126,17 @@ class Disturbing(NamedTuple):
     odometry: bool
     correct: int
     seed: int
+    localisation: Localisation | None
+    robot: Robot
+    dt: float
+
+    def plant(self, moved_by: Integrator, i: int, samples: int) -> Plant:
+        """The robot of run i."""
+        localisation, disturbed = self.localisation, self.at(i, samples)
+        if localisation is None:
+            return Plant(moved_by, disturbed)
+        believing = localisation.on(self.robot, self.dt, (self.seed, i, 1))
+        return Plant(moved_by, disturbed, believing=believing)
 
     def at(self, i: int, samples: int) -> Disturbed:
         """Of run i."""

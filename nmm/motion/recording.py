@@ -39,7 +39,7 @@ class Recorder:
     retreats (N,) : how often the robot had backed off; backed_off : before the first sample, with other tasks
     counts : how often distances changed the inputs; blocking : what held the robot back at the end
     at_middle : whether inputs are those of the middle between samples
-    disturbed : whether the robot does not do as it is told; believed (N, n): where its odometry has it
+    disturbed : whether the robot does not do as it is told; believed (N, n): where it is believed to be
     goes_on : whether the run goes on after the last sample, with other tasks
     singular_values (N, s) of J, swept : known once the trajectory is made
     """

@@ -13,7 +13,7 @@ from nmm.base.errors import InputError, expect_kind
 from nmm.base.lazy_call import lazy_call
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
-from nmm.control.plant import UNDISTURBED, Plant, method_for
+from nmm.control.plant import Plant, method_for
 from nmm.motion.disturbances import Disturbances, check_disturbed
 from nmm.motion.joining import join
 from nmm.motion.leg import Leg
@@ -101,9 +101,10 @@ def simulate(
         controller.solver.scene.check_start(0.0, q)
     times = sample_times(0.0, dt, steps, duration)
     expect_kind(disturbances, Disturbances | None, "disturbances", "Disturbances, as Disturbances(slip=0.99)")
-    disturbed = UNDISTURBED if disturbances is None else disturbances.on(robot, dt).at(0, len(times))
-    check_disturbed(disturbed, method)
-    plant, schedule = Plant(advance, disturbed), controller.schedule
+    plant, schedule = Plant(advance), controller.schedule
+    if disturbances is not None:
+        plant = disturbances.on(robot, dt).plant(advance, 0, len(times))
+    check_disturbed(plant.disturbed, method)
     if schedule is not None:
         legs = run_legs(controller, schedule, plant, times, q, progress, until, watch)
         run, distances = join(controller, schedule, legs, dt, method)

@@ -66,7 +66,8 @@ class Trajectory:
         read (of `outcome`, where it depends on that)
     frame : the end-effector frame that the task positions, if any
     path, desired (N, 3): its path and, where the task says, the desired one, m in the world
-    believed (N, n): where its odometry has the robot, which is what the controller sees, if it has odometry
+    believed (N, n): where odometry, or a filter, has the robot, which is what the controller sees, if it has
+        one
     target (3,): the fixed point that a bearing looks at, if any
     seen (N, P, 3): the points that cameras see, m in the world, if any
     cameras : which of them each camera sees, and where the task wants them in its picture

@@ -250,8 +250,8 @@ def _field(parameter: Parameter, spelled: Any, makes: type) -> tuple[Any, Any]:
             f"the type of {parameter.name}"
         )
     default = PydanticUndefined if parameter.required else parameter.default
-    if default == ():
-        default = []
+    if isinstance(default, tuple):
+        default = [*default]
     least = 1 if parameter.starred else None
     if parameter.starred:
         kind = Annotated[GenericAlias(list, (kind,)), BeforeValidator(listed)]

@@ -10,7 +10,7 @@ from pydantic_core import PydanticUndefined
 
 from nmm.base.kinds import REFERENCES, RESOLVERS, TASKS
 from nmm.scenario.collisions import OBSTACLE_PARTS, CollisionsPart, ObstaclePart
-from nmm.scenario.disturbances import DisturbancesPart
+from nmm.scenario.disturbances import DisturbancesPart, LocalisationPart
 from nmm.scenario.functions import FUNCTION_PARTS, REFERENCE_PARTS, CameraFaultsPart
 from nmm.scenario.keys import KeyedPart
 from nmm.scenario.limits import (
@@ -56,6 +56,7 @@ def sections() -> Iterator[ReferenceSection]:
     yield from _kinds("resolver", RESOLVER_PARTS, {kind: RESOLVERS.words(kind) for kind in RESOLVER_PARTS})
     yield _section("until", GoalPart)
     yield _section("disturbances", DisturbancesPart)
+    yield _section("disturbances.localisation", LocalisationPart)
     yield _section("retreat", RetreatPart)
     yield from _of_plugins()
     yield _section("limits", LimitsPart)

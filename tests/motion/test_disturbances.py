@@ -80,7 +80,7 @@ def test_page_and_figure_show_where_odometry_has_it() -> None:
     drift = {one.panel: one.values for one in channels(found).channels}["drift"]
     assert drift.max() == found["drift"].max()
     line = {one.get_label(): one for one in nmm.figures.stroboscopic(found).axes[0].get_lines()}
-    believed = line["where odometry has it"].get_xydata()
+    believed = line["where it is believed to be"].get_xydata()
     tip = nmm.Configuration(found.robot, found.believed[-1]).placement("ee").translation[:2]
     np.testing.assert_allclose(believed[-1], tip, atol=1e-12)
 

@@ -35,6 +35,7 @@ JOINT = {
 BALL = {"shape": {"kind": "sphere", "radius": 0.1}, "xyz": [1.4, 0.0, 0.4], "name": "ball"}
 END_BALL = {"shape": {"kind": "sphere", "radius": 0.15}, "xyz": [2.0, 1.0, 0.4], "name": "end"}
 ALPHA = 0.5
+SEEN = {"every": 0.1, "late": 0.04, "start": [0.05, 0.05, 0.05]}
 
 FEATURES: dict[str, dict[str, object]] = {
     "order 2": {"order": 2},
@@ -46,9 +47,10 @@ FEATURES: dict[str, dict[str, object]] = {
     "noise": {"disturbances": {"noise": 1e-3, "seed": 1}},
     "delay": {"disturbances": {"delay": 2}},
     "slip": {"disturbances": {"slip": {"v": 0.95}}},
+    "a localisation": {"disturbances": {"localisation": SEEN}},
     "Python functions": {"python_hand": True},
 }
-DISTURB = ("noise", "delay", "slip")
+DISTURB = ("noise", "delay", "slip", "a localisation")
 
 
 class PythonHand(Section):
@@ -111,7 +113,15 @@ class Case:
 
     @property
     def disturbances(self) -> nmm.Disturbances | None:
-        return nmm.Disturbances(**self.disturbed) if self.disturbed else None
+        if self.localisation is None:
+            return nmm.Disturbances(**self.disturbed) if self.disturbed else None
+        return nmm.Disturbances(**self.disturbed | {"localisation": self.localisation})
+
+    @property
+    def localisation(self) -> nmm.Localisation | None:
+        return (
+            nmm.Localisation(**self.disturbed["localisation"]) if "localisation" in self.disturbed else None
+        )
 
     def controller(self) -> nmm.Controller:
         return self.scenario.controller()
@@ -188,14 +198,20 @@ def loop(case: Case) -> Ran:
     noise = np.random.default_rng([case.disturbed.get("seed", 0), 0]).standard_normal((count, n))
     slip = [case.disturbed.get("slip", {}).get(name, 1.0) for name in case.robot.u_names]
     late, hold = case.disturbed.get("delay", 0), HeldInputs(case.robot)
+    sensors = case.localisation
+    believing = None if sensors is None else sensors.on(case.robot, DT, (case.disturbed.get("seed", 0), 0, 1))
+    pose = q[:3] if believing is None else believing.begin(q)
     for k in range(count):
         found.append(q)
-        given.append(loop.step(DT * k, q + case.disturbed.get("noise", 0.0) * noise[k]))
+        measured = np.concatenate([q[:3] if believing is None else pose, q[3:]])
+        given.append(loop.step(DT * k, measured + case.disturbed.get("noise", 0.0) * noise[k]))
         assert str(loop.state) == "running", loop.findings
         if case.reached(controller, DT * k, q):
             break
         acting = given[k - late] if k >= late else np.zeros(case.robot.n_u)
-        q = hold(q, slip * acting, DT)
+        before, q = q, hold(q, slip * acting, DT)
+        if believing is not None:
+            pose = believing.go_on(before, q, DT * acting[: case.robot.platform.p], DT)
     assert len(loop.trajectory()) == len(found)
     return Ran(np.array(found), np.array(given))
 

@@ -90,6 +90,7 @@ INNER = {
     "nmm.Disturbances.on",
     "nmm.extending.LimitReport.__init__",  # made by a controller
     "nmm.Limits.on",
+    "nmm.Localisation.on",
     "nmm.Plan.__init__",  # made by `nmm.plan`
     "nmm.Plan.found",
     "nmm.Retreat.on",

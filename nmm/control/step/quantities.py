@@ -163,7 +163,8 @@ def lateral_slip(record: Record) -> Array:
 
 
 def drift(record: Record) -> Array:
-    """How far the platform is from where odometry has it at each sample (N,), m; (0,) without odometry."""
+    """How far the platform is from where it is believed to be at each sample (N,), m; (0,) where it is seen
+    as it is."""
     believed = record.arrays.get("believed")
     if believed is None:
         return np.zeros(0)
@@ -339,7 +340,7 @@ _TABLE = (
     RecordedQuantity("desired", "", "its desired path", "N3", "m", optional=True),
     RecordedQuantity("planned", "", "where its plan was", "Nn", "coordinates", optional=True, finite=True),
     RecordedQuantity(
-        "believed", "", "where its odometry has it", "Nn", "coordinates", since=9, optional=True, finite=True
+        "believed", "", "where it is believed to be", "Nn", "coordinates", since=9, optional=True, finite=True
     ),
     RecordedQuantity("target", "", "the point that a bearing looks at", "3", "m", optional=True, finite=True),
     RecordedQuantity("seen", "", "the points that cameras see", "NP3", "m", since=9, optional=True),
@@ -368,20 +369,20 @@ _TABLE = (
         ),
     ),
     RecordedQuantity(
-        "drift", "drift", "distance of the platform from where its odometry has it", unit="m", saved=False,
+        "drift", "drift", "distance of the platform from where it is believed to be", unit="m", saved=False,
         of=drift, place=2,
-        curve=Curve("drift", "Odometry", 4, opens_below=np.inf),
+        curve=Curve("drift", "Believed pose", 4, opens_below=np.inf),
         numbers=(
             Number(
                 "drift", lambda t, x: x[-1], "drift, at the end",
-                about="distance of the platform from where its odometry has it, at the end",
+                about="distance of the platform from where it is believed to be, at the end",
             ),
             Number(
                 "drift_max", lambda t, x: x.max(), "drift, largest",
-                about="largest distance of the platform from where its odometry has it",
+                about="largest distance of the platform from where it is believed to be",
             ),
         ),
-        line=("drift of the odometry", "{drift:.3g} m at the end, {drift_max:.3g} m at most"),
+        line=("drift of the believed pose", "{drift:.3g} m at the end, {drift_max:.3g} m at most"),
     ),
     RecordedQuantity(
         "sliding", "", "speed of the wheel that slides fastest by design", unit="m/s", saved=False, place=2,

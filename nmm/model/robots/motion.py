@@ -103,7 +103,7 @@ class Motion:
     path (N, 3) : the end-effector's path, m in the world; computed from `frame` when not given
     desired (M, 3) : the desired path, m in the world
     planned (N, n) : where its plan was, if it followed one
-    believed (N, n) : where its odometry has it
+    believed (N, n) : where it is believed to be, by its odometry or a filter
     target (3,), or (T, 3) : a fixed point to look at or to reach, or several, m in the world
     label : name in the legend, such as "RG"
     frame : the end-effector's frame

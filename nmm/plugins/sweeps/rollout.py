@@ -21,7 +21,7 @@ from nmm.base.findings.run import line
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.integrators import Integrator
-from nmm.control.plant import Plant, method_for
+from nmm.control.plant import method_for
 from nmm.control.step.recorded import Recorded
 from nmm.motion.closed_loop import drive_loop
 from nmm.motion.disturbances import Disturbances, Disturbing, check_disturbed
@@ -215,7 +215,7 @@ class _Runs:
         if self.stop.is_set():
             return
         controller, recorder, advance = self._controller(i)
-        plant = Plant(advance, self.disturbing.at(i, len(self.times)))
+        plant = self.disturbing.plant(advance, i, len(self.times))
         start, schedule = self.starts[i].copy(), controller.schedule
         legs: list[Leg] = []
         if schedule is None:

@@ -31,6 +31,8 @@ _LARGE, _FINEST = 42.0, 0.3
 MOST, LEAST = 11, 4
 #: A run whose arm rises or falls by more than this is drawn from the side too, m.
 _RISES = 0.01
+#: What the legend calls the path by odometry, or by a filter.
+BELIEVED = "where it is believed to be"
 _PATH_COLOR, _BODY, _EDGE, _ARM = resolver_style.BLUE, "#B9C0CA", "#3F4652", resolver_style.VERMILLION
 
 OBSTACLE, OBSTACLE_TEXT = resolver_style.ORANGE, "#7A5200"
@@ -56,10 +58,9 @@ def stroboscopic(
 ) -> Figure:
     """The robot seen from above at instants of the run (the paper's Figs. 3, 5 and 7).
 
-    Platform with wheels and heading, arm, end-effector's path, the one by odometry, desired path, start, end,
-    the target, looked at or held, and what cameras see; drawings fade towards the start. A second view from
-    the side, of the
-    upright plane in which the motion mostly lies, where the arm leaves the ground's.
+    Platform with wheels and heading, arm, end-effector's path, the one that is believed, desired path, start,
+    end, the target, looked at or held, and what cameras see; drawings fade towards the start. A second view
+    from the side, of the upright plane in which the motion mostly lies, where the arm leaves the ground's.
 
     Parameters
     ----------
@@ -105,7 +106,7 @@ class MotionScene(Viewed):
     @property
     def names(self) -> list[str]:
         names = ["desired path"] if "desired" in self.lines else []
-        names += ["where odometry has it"] * ("believed" in self.lines)
+        names += [BELIEVED] * ("believed" in self.lines)
         names += [self._path_name, "start", "end"]
         names += [*dict.fromkeys(outline.name for outline in self.outlines), *self.seen.names]
         return names if not len(self.trajectory.marks) else [*names, "target"]
@@ -194,7 +195,7 @@ class MotionScene(Viewed):
         if "believed" in self.lines:
             axes.plot(
                 *view.of(self.lines["believed"]).T, ":", color=style.GREY, linewidth=1.5,
-                label="where odometry has it", zorder=5.15,
+                label=BELIEVED, zorder=5.15,
             )  # fmt: skip
         path = view.of(self.lines["path"])
         axes.plot(*path.T, color=_PATH_COLOR, linewidth=1.5, label=self._path_name, zorder=5.1)

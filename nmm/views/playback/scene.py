@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 DESIRED: Rgb = (0.16, 0.18, 0.22)
 TARGET: Rgb = (0.83, 0.10, 0.22)
 
-#: Colour and opacity of a robot where its odometry has it.
+#: Colour and opacity of a robot where it is believed to be.
 BELIEVED: Rgb = (0.42, 0.45, 0.50)
 THROUGH = 0.4
 INSTANTS = 80
@@ -273,7 +273,7 @@ def _believed(
     start: float,
     fps: float,
 ) -> list[Command]:
-    """A transparent copy of the robot that moves where odometry has it; what animates it."""
+    """A transparent copy of the robot that moves where it is believed to be; what animates it."""
     frames = keyframes(motion, fps, wheels)
     copy = DrawnRobot(
         drawing,

@@ -110,7 +110,7 @@
   }
 
   nmm.hooks.believed = ({ paths, color }) =>
-    nmm.legend({ kind: "box", color, text: "where odometry has it", path: paths });
+    nmm.legend({ kind: "box", color, text: "where it is believed to be", path: paths });
 
   // Whether of two boxes, seen from above, one takes more than a share of the other's room.
   function overlap(one, other, share) {
