@@ -255,7 +255,7 @@ def test_every_key_is_described() -> None:
     assert len(set(titles)) == len(titles)
     shared = [kind for kind, part in REFERENCE_PARTS.items() if part is FUNCTION_PARTS.get(kind)]
     others = ("the file", "robot", "robot, with arms mounted", "robot.arms", "objective.terms")
-    others = (*others, "reference.faults")
+    others = (*others, "reference.faults", "disturbances.localisation")
     others = (*others, "limits", "limits.bounds", "until", "disturbances", "retreat", "plan", "plan.track")
     others = (*others, "steering", "scene", "scene.carried", "scene.scenery")
     others = (*others, *(f"task.when, kind: {kind}" for kind in CONDITION_PARTS))

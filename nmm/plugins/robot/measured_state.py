@@ -68,10 +68,28 @@ class MeasuredState:
         self._seen: Array | None = None
         self._candidate_at, self._agreed = 0.0, 0
         self._still = np.zeros(self._robot.n)
+        self._frame: Array | None = None
 
     def expect_jump(self) -> None:
         """The next measurement that is in time is used wherever it is."""
         self._used = None
+
+    def move_frame(self, frame: Array) -> Jump | None:
+        """Measurements go on without jumps in a frame that is at the pose `frame` (3,) now, m and rad: where
+        the robot was goes with it. By how much, where a measurement may not be off by so much."""
+        before, self._frame = self._frame, frame
+        if before is None or self.at == -math.inf:
+            return None
+        earlier = self.q
+        self.q = _carried(self.q, before, frame)
+        if self._used is not None:
+            self._used = _carried(self._used, before, frame)
+        if self._candidate is not None:
+            self._candidate = _carried(self._candidate, before, frame)
+        gone = self.q - earlier
+        jump = Jump(float(np.hypot(*gone[:2])), float(abs(gone[2])))
+        allowed = jump.m <= self._tolerances.metres and jump.rad <= self._tolerances.radians
+        return None if allowed else jump
 
     def move_on(self, since: float, until: float) -> None:
         """No measurement, but inputs, between two calls."""
@@ -150,3 +168,13 @@ class MeasuredState:
         self._agreed = self._agreed + 1 if near else 1
         self._candidate, self._candidate_at = read, at
         return self._agreed >= confirm
+
+
+def _carried(q: Array, before: Array, frame: Array) -> Array:
+    """q (n,) of a platform that moves with a frame from one pose (3,) to another."""
+    turned = math.remainder(frame[2] - before[2], 2.0 * math.pi)
+    c, s = math.cos(turned), math.sin(turned)
+    x, y = q[:2] - before[:2]
+    moved = q.copy()
+    moved[:3] = frame[0] + c * x - s * y, frame[1] + s * x + c * y, q[2] + turned
+    return moved

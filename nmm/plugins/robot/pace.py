@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array
+from nmm.plugins.robot.pose_filter import PoseFilter
 
 
 class Paced(Protocol):
@@ -22,14 +23,16 @@ class Paced(Protocol):
     @property
     def u(self) -> Array: ...
 
-    def step(self, now: float, q: ArrayLike | None = None, measured_at: float | None = None) -> Array: ...
+    def step(
+        self, now: float, q: ArrayLike | PoseFilter | None = None, measured_at: float | None = None
+    ) -> Array: ...
 
     def stop(self, why: str) -> None: ...
 
 
 def keep_pace(
     loop: Paced,
-    read: Callable[[], tuple[ArrayLike, float] | None],
+    read: Callable[[], tuple[ArrayLike, float] | PoseFilter | None],
     write: Callable[[Array], object],
     each: Callable[[Any], object] | None,
     duration: float,
@@ -63,7 +66,8 @@ def keep_pace(
     began = due = running = clock()
     while loop.state != "stopped" or (not sent and clock() < until):
         measured = attempt(read)
-        attempt(send, loop.step(clock(), *(measured or ())))
+        measurement = (measured,) if isinstance(measured, PoseFilter) else measured or ()
+        attempt(send, loop.step(clock(), *measurement))
         if each is not None and raised is None:
             attempt(each, loop)
         if clock() - began >= duration:

@@ -21,6 +21,7 @@ from nmm.plugins.robot.loop_state import LoopState
 from nmm.plugins.robot.loop_watch import LoopWatch
 from nmm.plugins.robot.measured_state import MeasuredState, Tolerances
 from nmm.plugins.robot.pace import keep_pace
+from nmm.plugins.robot.pose_filter import PoseFilter
 
 _STOPS = LoopState.STOPPING, LoopState.STOPPED
 
@@ -185,14 +186,17 @@ class Loop:
         if self.state in (LoopState.RUNNING, LoopState.HOLDING):
             self._enter(LoopState.STARTING)
 
-    def step(self, now: float, q: ArrayLike | None = None, measured_at: float | None = None) -> Array:
+    def step(
+        self, now: float, q: ArrayLike | PoseFilter | None = None, measured_at: float | None = None
+    ) -> Array:
         """The inputs u (m,) until the next call.
 
         Parameters
         ----------
         now : s, of any clock
-        q : (n,) measured, None where there is no measurement since the last call
-        measured_at : s, when, of the same clock; now unless given
+        q : (n,) measured, None where there is no measurement since the last call; or a `PoseFilter` that has
+            it: what its fixes move is no jump, and where it is more than `jump`, the robot starts softly
+        measured_at : s, when, of the same clock; now, or the filter's time, unless given
         """
         before = self.t
         if silence := self._clock.tell(now):
@@ -201,8 +205,14 @@ class Loop:
                 self._found.add("not_called", self.t, gap=silence)
                 self._begin_stop("not_called")
         self._measured.move_on(before, self.t)
+        corrected = None
+        if isinstance(q, PoseFilter):
+            corrected = self._measured.move_frame(q.map_to_odom)
+            measured_at = q.t if measured_at is None else measured_at
+            q = q.q
         at = self.t if measured_at is None else self.time_of(measured_at)
         refused, jump = self._measured.take(self.t, q, at)
+        jump = jump or corrected
         self._watch.look_at_measurement(self.t, refused, jump)
         if jump is not None:
             self._start_again()
@@ -272,7 +282,7 @@ class Loop:
 
     def run(
         self,
-        read: Callable[[], tuple[ArrayLike, float] | None],
+        read: Callable[[], tuple[ArrayLike, float] | PoseFilter | None],
         write: Callable[[Array], object],
         *,
         each: Callable[[Loop], object] | None = None,
@@ -289,7 +299,7 @@ class Loop:
 
         Parameters
         ----------
-        read : gives a measurement (q, time of the clock), or None
+        read : gives a measurement (q, time of the clock), or a `PoseFilter`, or None
         write : sends u (m,) to the drives, which hold it
         each : called with the loop after each write, for what is done beside: targets, `stop`
         duration : s

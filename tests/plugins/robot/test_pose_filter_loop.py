@@ -34,17 +34,16 @@ def test_a_loop_does_its_task_where_the_filter_says_that_the_robot_is() -> None:
         )  # fmt: skip
         task = nmm.Task(nmm.Position("ee", "xy"), target, gain=1.0)
         controller = nmm.Controller(robot, task, nmm.DampedLeastSquares(alpha=1), dt=0.01)
-        loop, seen = nmm.Loop(controller, jump=(0.3, 0.3)), []
+        loop, seen = nmm.Loop(controller), []
 
-        def measure() -> tuple[Array, float]:
+        def measure() -> nmm.PoseFilter:
             t = clock[0]
             seen.append((t, q[:3] + 0.01 * rng.standard_normal(3)))
-            believed = pose_filter.update(read, t)
+            pose_filter.update(read, t)
             if with_fixes and len(seen) % 10 == 0:
                 was, pose = seen[-6 if len(seen) > 6 else 0]
                 pose_filter.fix(pose, 1e-4 * np.eye(3), was)
-                believed = pose_filter.q
-            return believed, t
+            return pose_filter
 
         def write(u: Array) -> None:
             nonlocal q
@@ -66,6 +65,80 @@ def test_a_loop_does_its_task_where_the_filter_says_that_the_robot_is() -> None:
 
     assert drive_loop(True) < 0.03
     assert drive_loop(False) > 0.1
+
+
+class Turning:
+    """A loop and a filter of differential unicycle_2r that turns its wheels and joints as it asks."""
+
+    def __init__(self) -> None:
+        self.robot = nmm.load("unicycle_2r", platform="differential")
+        start = self.robot.q({"q1": 0.3, "q2": 0.9})
+        names = (*self.robot.wheel_speeds(np.zeros(2)), "q1", "q2")
+        self.readings = dict(zip(names, (0.0, 0.0, 0.3, 0.9), strict=True))
+        self.pose_filter = nmm.PoseFilter(
+            self.robot, start, self.readings, -0.01, covariance=np.diag([0.04, 0.04, 0.04]), spread=1e-4,
+            fastest=1e3,
+        )  # fmt: skip
+        task = nmm.Task(nmm.Position("ee", "xy"), np.array([3.0, 0.5]), gain=1.0)
+        controller = nmm.Controller(self.robot, task, nmm.DampedLeastSquares(alpha=1), dt=0.01)
+        self.loop, self.t = nmm.Loop(controller, soft_start=0.1), 0.0
+
+    def go(self, count: int, jump: float = 0.0, arrays: bool = False) -> None:
+        """Steps, the first with wheels that have turned by a `jump` more, rad."""
+        for k in range(count):
+            more = [jump, jump, 0.0, 0.0] if k == 0 else [0.0] * 4
+            for name, rate, by in zip(self.readings, self.loop.u, more, strict=True):
+                self.readings[name] += 0.01 * rate + by
+            self.pose_filter.update(self.readings, self.t)
+            if arrays:
+                self.loop.step(self.t, self.pose_filter.q, self.t)
+            else:
+                self.loop.step(self.t, self.pose_filter)
+            self.t += 0.01
+
+    def fix(self, *by: float) -> None:
+        """Where it is believed to be is wrong by this, m and rad."""
+        pose = self.pose_filter.pose + by
+        assert self.pose_filter.fix(pose, 1e-8 * np.eye(3), self.pose_filter.t) == "used"
+
+
+def test_what_a_fix_corrects_is_no_jump_and_what_a_counter_jumps_is() -> None:
+    """A fix that moves it by 4 cm is gone on with, one of 30 cm with a soft start, at once; without a filter,
+    the loop takes the first for a fault of a sensor. 0.5 m by the wheels is refused."""
+    robot = Turning()
+    robot.go(50)
+    assert str(robot.loop.state) == "running"
+    robot.fix(0.03, -0.03, 0.02)
+    robot.go(1)
+    assert str(robot.loop.state) == "running"
+    assert not robot.loop.findings
+    np.testing.assert_allclose(robot.loop.q[:3], robot.pose_filter.pose, rtol=0, atol=1e-9)
+    robot.pose_filter.restart(robot.pose_filter.pose, np.diag([0.04, 0.04, 0.04]))
+    robot.fix(0.3, 0.0, 0.0)
+    robot.go(1)
+    assert [finding.code for finding in robot.loop.findings] == ["relocated"]
+    assert robot.loop.findings[0].values["m"] == pytest.approx(0.3, abs=1e-3)
+    assert str(robot.loop.state) == "starting"
+    np.testing.assert_allclose(robot.loop.q[:3], robot.pose_filter.pose, rtol=0, atol=1e-9)
+    robot.go(30)
+    assert str(robot.loop.state) == "running"
+    assert not robot.loop.refused
+    robot.go(2, jump=5.0)
+    assert robot.loop.refused["jump"] == 2
+    of_arrays = Turning()
+    of_arrays.go(50, arrays=True)
+    of_arrays.fix(0.2, 0.0, 0.0)
+    of_arrays.go(1, arrays=True)
+    assert of_arrays.loop.refused["jump"] == 1
+
+
+def test_a_filter_without_new_readings_is_a_measurement_that_came_again() -> None:
+    robot = Turning()
+    robot.go(50)
+    for k in range(3):
+        robot.loop.step(robot.t + 0.01 * k, robot.pose_filter)
+    assert robot.loop.refused == {"repeated": 3}
+    assert str(robot.loop.state) == "running"
 
 
 def test_it_runs_as_plain_python_to_the_same_numbers() -> None:
