@@ -144,6 +144,11 @@ def test_figures_and_a_comparison_show_what_is_believed_and_what_is_true(tmp_pat
     true = line["path of ee"].get_xydata()
     assert believed.shape == true.shape
     assert 0.01 < np.linalg.norm(believed - true, axis=1).max() < 0.2
+    figure = nmm.figures.comparison([simulated, run(every=1.0)])
+    named = {line.get_label(): line for axes in figure.axes for line in axes.get_lines()}
+    believed = [line for name, line in named.items() if str(name).endswith(": where it is believed to be")]
+    assert len(believed) == 2
+    np.testing.assert_allclose(believed[0].get_xydata(), simulated.believed[:, :2])
     file = tmp_path / "seen.yaml"
     file.write_text(yaml.safe_dump(scenario({}, duration=1.5).resolved()), "utf-8")
     out = tmp_path / "both"

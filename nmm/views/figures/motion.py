@@ -20,7 +20,7 @@ from nmm.views.figures import style
 from nmm.views.figures.seen_points import DrawnPoints
 from nmm.views.figures.silhouette import DrawnPose, Ink, Silhouette, hull, outline_points
 from nmm.views.figures.time_labels import SIZE, LabelSubject, OccupiedCells, Place, places
-from nmm.views.figures.views import ABOVE, View, Viewed, page, upright
+from nmm.views.figures.views import ABOVE, BELIEVED, View, Viewed, page, upright
 from nmm.views.playback.placements import base_position
 
 #: Size of the marks at the path's ends, pt.
@@ -31,8 +31,6 @@ _LARGE, _FINEST = 42.0, 0.3
 MOST, LEAST = 11, 4
 #: A run whose arm rises or falls by more than this is drawn from the side too, m.
 _RISES = 0.01
-#: What the legend calls the path by odometry, or by a filter.
-BELIEVED = "where it is believed to be"
 _PATH_COLOR, _BODY, _EDGE, _ARM = resolver_style.BLUE, "#B9C0CA", "#3F4652", resolver_style.VERMILLION
 
 OBSTACLE, OBSTACLE_TEXT = resolver_style.ORANGE, "#7A5200"

@@ -28,6 +28,8 @@ _RISES = 0.01
 #: The least height of a drawing is twice this share of its width.
 _FLAT = 0.1
 _DESIRED = "#C3C8D0"
+#: What legends call a path by odometry, or by a filter.
+BELIEVED = "where it is believed to be"
 
 
 @dataclass(frozen=True)
@@ -165,8 +167,8 @@ def draw_views(
 
 
 class Paths(Viewed):
-    """The frames' and the platforms' paths of runs, each with a look, what is desired, targets, and
-    what cameras see."""
+    """The frames' and the platforms' paths of runs, each with a look, and those of platforms where they are
+    believed to be; what is desired, targets, and what cameras see."""
 
     on_the_ground = False
 
@@ -176,7 +178,8 @@ class Paths(Viewed):
         self._frames = [run.frame for run in runs]
         self._seen = DrawnPoints(runs)
         self._paths = [run.path for run in runs]
-        self._floors = [_on_the_floor(run) for run in runs]
+        self._floors = [_on_the_floor(run, run.q) for run in runs]
+        self._believed = [_on_the_floor(run, run.believed) for run in runs]
         risen = [path for path in (*self._paths, self._desired) if path is not None]
         rises = any(float(np.ptp(path[:, 2])) > _RISES for path in risen)
         self.views = (ABOVE, upright(risen[-1])) if rises else (ABOVE,)
@@ -188,10 +191,11 @@ class Paths(Viewed):
         for i, (name, *_) in enumerate(self._worn):
             names += [f"{name}: {self._frames[i]}"] * (self._paths[i] is not None)
             names += [f"{name}: platform"] * (self._floors[i] is not None)
+            names += [f"{name}: {BELIEVED}"] * (self._believed[i] is not None)
         return names
 
     def points(self, view: View, width: float) -> list[Array]:
-        floors = self._floors if view == ABOVE else []
+        floors = [*self._floors, *self._believed] if view == ABOVE else []
         parts = [self._held, self._desired, *self._seen.parts, *self._paths, *floors]
         points = np.vstack([view.of(part) for part in parts if part is not None and len(part)])
         low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
@@ -215,10 +219,12 @@ class Paths(Viewed):
                     axes.plot(
                         *view.of(path).T, dashes, color=color, linewidth=thick, label=f"{name}: {whose}"
                     )
+            if (believed := self._believed[i]) is not None and view == ABOVE:
+                axes.plot(*view.of(believed).T, ":", color=color, linewidth=1.2, label=f"{name}: {BELIEVED}")
 
 
-def _on_the_floor(run: Trajectory) -> Array | None:
-    """Where the platform has been (N, 3); None for an arm on the ground."""
-    if not run.robot.platform.n_p:
+def _on_the_floor(run: Trajectory, q: Array | None) -> Array | None:
+    """Where the platform has been (N, 3), with q (N, n); None for an arm on the ground."""
+    if q is None or not run.robot.platform.n_p:
         return None
-    return np.column_stack([base_position(run.robot, run.q), np.zeros(len(run))])
+    return np.column_stack([base_position(run.robot, q), np.zeros(len(run))])
