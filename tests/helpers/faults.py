@@ -32,6 +32,10 @@ KERNELS = "nmm/base/kernels/"
 PLATFORM_FILES = "nmm/model/platforms/"
 LOADING = "nmm/model/robots/loading/"
 TASKS = "nmm/control/functions/tasks/"
+ROBOT = "nmm/plugins/robot/"
+GYRO = "plugins/robot/test_pose_filter.py::test_a_gyro_is_what_joint_gaussians_make_of_it"
+EXACT = "motion/test_localisation.py::test_without_noise_and_slip_the_run_is_that_of_odometry"
+BELIEVED = "motion/test_localisation.py::test_what_is_believed_is_what_a_filter_says_of_the_same_sensors"
 
 
 class Fault(NamedTuple):
@@ -117,6 +121,14 @@ FAULTS = [
     Fault(LOADING + "packages.py", "file = self._of_mujoco(name) or self._nearby", "file = self._nearby", "model/test_file_elements.py::test_meshes_are_where_mujoco_looks_for_them"),
     Fault("nmm/plugins/robot/counted_motion.py", "* spread[c] * abs(by[c]) * noise[j, c]", "* spread[c] * noise[j, c]", "model/test_odometry.py"),
     Fault("nmm/plugins/robot/counted_motion.py", "rows[0, j] = P[0, j] - (ahead[1]", "rows[0, j] = P[0, j] + (ahead[1]", "model/test_odometry.py"),
+    # A pose filter
+    Fault(ROBOT + "filter_step.py", "way = abs(twist[2]) if i == 2", "way = 1.0 if i == 2", GYRO),
+    Fault(ROBOT + "filter_step.py", "A[i, 4 + c] += G[i, m] * slopes[m, c]", "A[i, 4 + c] -= G[i, m] * slopes[m, c]", GYRO),
+    Fault(ROBOT + "filter_fix.py", "z[m] - place[m] + D[m, 0] * eps[0]", "z[m] - place[m] - D[m, 0] * eps[0]", "plugins/robot/test_pose_filter.py::test_a_fix_is_what_a_search_for_the_likeliest_pose_finds"),
+    Fault(ROBOT + "filter_history.py", "until = (fixes.t[fix] - start) / lasts", "until = 1.0", "plugins/robot/test_pose_filter_fixes.py::test_a_fix_within_a_step_is_taken_at_its_time"),
+    Fault(ROBOT + "measured_state.py", "frame[0] + c * x - s * y", "frame[0] + c * x + s * y", "plugins/robot/test_pose_filter_loop.py::test_a_fix_moves_where_it_is_believed_to_be_without_new_readings"),
+    Fault(ROBOT + "simulated_filter.py", "/ dt + sensors.bias + noise", "/ dt + noise", BELIEVED),
+    Fault("nmm/control/plant.py", "by = dt * u + 0.5 * dt * dt * u_dot", "by = dt * u", EXACT),
 ]  # fmt: skip
 
 

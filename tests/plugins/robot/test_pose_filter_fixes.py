@@ -35,6 +35,19 @@ def test_a_fix_that_is_ahead_of_the_encoders_waits() -> None:
     np.testing.assert_allclose(ahead.pose, drive(fixes_of([0.0] * 8))[0].pose, rtol=0, atol=1e-12)
 
 
+def test_a_fix_within_a_step_is_taken_at_its_time() -> None:
+    """As if the step had been two, before it and after it; also with a gyro's mean rate over both."""
+    noise: dict[str, Any] = {"spread": 1e-3, "gyro_noise": 0.01, "bias_deviation": 0.1}
+    whole, parts = make(**noise), make(**noise)
+    whole.step(0.1, [1.0, 2.0], yaw_rate=0.4)
+    assert whole.fix([0.2, 0.1], 0.01 * np.eye(2), 0.03) == "used"
+    parts.step(0.03, [0.3, 0.6], yaw_rate=0.4)
+    assert parts.fix([0.2, 0.1], 0.01 * np.eye(2), 0.03) == "used"
+    parts.step(0.1, [0.7, 1.4], yaw_rate=0.4)
+    np.testing.assert_allclose(whole.pose, parts.pose, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(whole.state_covariance, parts.state_covariance, rtol=0, atol=1e-12)
+
+
 def test_fixes_beyond_the_delay_change_nothing() -> None:
     pose_filter, _, _ = drive([])
     before = pose_filter.pose

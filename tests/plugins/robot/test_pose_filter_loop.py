@@ -15,6 +15,7 @@ from planar_poses import matrix_of
 
 import nmm
 from nmm.base.errors import InputError
+from nmm.model.robots.zero_order_hold import HeldInputs
 
 Array = np.ndarray
 
@@ -130,6 +131,18 @@ def test_what_a_fix_corrects_is_no_jump_and_what_a_counter_jumps_is() -> None:
     of_arrays.fix(0.2, 0.0, 0.0)
     of_arrays.go(1, arrays=True)
     assert of_arrays.loop.refused["jump"] == 1
+
+
+def test_a_fix_moves_where_it_is_believed_to_be_without_new_readings() -> None:
+    """From where the fix has it, moved on by the inputs since."""
+    robot = Turning()
+    robot.go(80)
+    robot.fix(0.02, 0.03, 0.05)
+    u, q = robot.loop.u, robot.pose_filter.q
+    robot.loop.step(robot.t, robot.pose_filter)
+    assert np.linalg.norm(q[:2]) > 0.1
+    expected = HeldInputs(robot.robot)(q, u, 0.01)
+    np.testing.assert_allclose(robot.loop.q, expected, rtol=0, atol=1e-9)
 
 
 def test_a_filter_without_new_readings_is_a_measurement_that_came_again() -> None:
