@@ -1,6 +1,7 @@
 """An invariant Kalman filter on SE(2) x bias x scales: its state, and a prediction, as plain kernels.
 
-The state is x (d,) = [x, y, theta, gyro bias, scales of the counters], its error eps (d,) in
+The state is x (d,) = [x, y, theta, gyro bias, scales of the counters, scale of turns], of which the last two
+may be left out (both, or the last), its error eps (d,) in
 
     T = T_believed exp(eps[:3]),    bias and scales = those believed + eps[3:],
 
@@ -37,14 +38,15 @@ class Noise(NamedTuple):
     shares, spread (k,) : of each counter, the share of its turning that moves the platform, and the variance
         of its turning for each radian or m
     slip (3,) : variances along and across for each m of the way, m, and of the turn for each rad, rad
-    gyro (3,) : variance of a turn for each second, rad²/s; of the walk of its bias, rad²/s³; of that of the
-        scales, 1/s
+    gyro (2,) : variance of a turn for each second, rad²/s; of the walk of its bias, rad²/s³
+    walks (2,) : variances of the walks of the counters' scales and of that of turns, 1/s
     """
 
     shares: Vector
     spread: Vector
     slip: Vector
     gyro: Vector
+    walks: Vector
 
 
 @compiled
@@ -95,11 +97,18 @@ def predict(
     difference before the pose goes on, so a robot that stands still shows its gyro's bias.
     """
     d, k, p = x.shape[0], by.shape[0], counted.steered.shape[0]
-    turned, up, twist, slopes = scratch(k), scratch(p), scratch(3), scratch((3, k))
+    turned, up, twist, slopes = scratch(k), scratch(p), scratch(3), scratch((3, k + 1))
     scaled = d > 4
     for c in range(k):
         turned[c] = noise.shares[c] * by[c] * (1.0 + x[4 + c] if scaled else 1.0)
     counted_motion(counted, own, ahead, turned, up, twist, slopes)
+    for i in range(3):
+        slopes[i, k] = 0.0
+    if d > 4 + k:
+        slopes[2, k] = twist[2]
+        twist[2] *= 1.0 + x[4 + k]
+        for c in range(k):
+            slopes[2, c] *= 1.0 + x[4 + k]
     Q, eps, pull, shift = scratch((3, 3)), scratch(d), scratch(d), scratch(3)
     for i in range(3):
         for j in range(3):
@@ -119,13 +128,11 @@ def predict(
     if not math.isnan(rate):
         for i in range(d):
             pull[i] = P[i, 3] * dt
-            if scaled:
-                for c in range(k):
-                    pull[i] += P[i, 4 + c] * slopes[2, c]
+            for c in range(d - 4):
+                pull[i] += P[i, 4 + c] * slopes[2, c]
         S = Q[2, 2] + noise.gyro[0] * dt + dt * pull[3]
-        if scaled:
-            for c in range(k):
-                S += slopes[2, c] * pull[4 + c]
+        for c in range(d - 4):
+            S += slopes[2, c] * pull[4 + c]
         residual = (rate - x[3]) * dt - twist[2]
         for i in range(d):
             pull[i] /= S
@@ -133,9 +140,8 @@ def predict(
         for i in range(3):
             shift[i] = Q[i, 2] / S
             twist[i] += shift[i] * residual
-            if scaled:
-                for c in range(k):
-                    twist[i] += slopes[i, c] * eps[4 + c]
+            for c in range(d - 4):
+                twist[i] += slopes[i, c] * eps[4 + c]
     A, Ad, J, G, rows = scratch((3, d)), scratch((3, 3)), scratch((3, 3)), scratch((3, 3)), scratch((3, d))
     right_jacobian_planar(eps, step, J)
     compose_planar(x, step)
@@ -147,10 +153,9 @@ def predict(
         for j in range(3):
             for m in range(3):
                 A[i, j] += Ad[i, m] * J[m, j]
-        if scaled:
-            for c in range(k):
-                for m in range(3):
-                    A[i, 4 + c] += G[i, m] * slopes[m, c]
+        for c in range(d - 4):
+            for m in range(3):
+                A[i, 4 + c] += G[i, m] * slopes[m, c]
     replace_rows(A, P, rows)
     for i in range(3):
         for j in range(3):
@@ -178,4 +183,4 @@ def predict(
                 P[i, j] -= pull[i] * S * pull[j]
     P[3, 3] += noise.gyro[1] * dt
     for i in range(4, d):
-        P[i, i] += noise.gyro[2] * dt
+        P[i, i] += noise.walks[0 if i < 4 + k else 1] * dt

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, array, counted, matrix, positive, scalar, vector
-from nmm.base.errors import InputError, expect
+from nmm.base.errors import InputError
 from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.record_layout import views
 from nmm.model.robots.robot import Robot
 from nmm.plugins.robot import filter_history as rings
-from nmm.plugins.robot.filter_checks import covariance_of, float_array, gates_of, turned_axes
-from nmm.plugins.robot.filter_step import Noise
-from nmm.plugins.robot.odometry import Odometry, by_counter
+from nmm.plugins.robot.filter_checks import covariance_of, float_array, gates_of, noise_of, turned_axes
+from nmm.plugins.robot.odometry import Odometry
 
 #: What became of a fix, by the codes of `filter_history`.
 OUTCOMES = ("waiting", "used", "outlier", "late", "early", "crowded")
@@ -54,6 +53,8 @@ class PoseFilter:
         rad/s for the root of each s
     scale_deviation, scale_walk : likewise of each counter's scale, a share of its turning, and 1/√s: a tyre
         that loses air. With 0 and 0 the scales are no part of the state
+    turn_deviation, turn_walk : likewise of a scale of all turns, the file's track (or wheelbase) over what it
+        is: a skid-steer's depends on the ground
     delay : fixes may come so late, s
     rate : readings a second, at most; with more, fixes may come less late
     fixes : how many of the last `delay` are remembered
@@ -98,6 +99,8 @@ class PoseFilter:
         bias_walk: float = 0.0,
         scale_deviation: float = 0.0,
         scale_walk: float = 0.0,
+        turn_deviation: float = 0.0,
+        turn_walk: float = 0.0,
         delay: float = 0.5,
         rate: float = 200.0,
         fixes: int = 64,
@@ -109,16 +112,13 @@ class PoseFilter:
         self.robot = robot
         self._odometry = Odometry(robot, q, encoders, slip, fastest=fastest, wrapped=wrapped)
         self.counters = self._odometry.counters
-        k = len(self.counters)
-        variances = by_counter(spread, self.counters, np.zeros(k), f"{where}: spread")
-        expect(bool((variances >= 0.0).all()), f"{where}: spread", "numbers from 0", variances)
-        slips = vector(slip_noise, 3, f"{where}: slip_noise")
         self._has_gyro = gyro_noise is not None
-        gyro = 0.0 if gyro_noise is None else positive(gyro_noise, f"{where}: gyro_noise")
-        named = {"bias_deviation": bias_deviation, "bias_walk": bias_walk}
-        named |= {"scale_deviation": scale_deviation, "scale_walk": scale_walk}
-        bias, walk, scale, drift = (scalar(v, f"{where}: {n}", least=0.0) for n, v in named.items())
-        d = 4 + (k if scale > 0.0 or drift > 0.0 else 0)
+        walking = {
+            "bias": (bias_deviation, bias_walk),
+            "scale": (scale_deviation, scale_walk),
+            "turn": (turn_deviation, turn_walk),
+        }
+        noise, P = noise_of(self._odometry, where, spread, slip_noise, gyro_noise, walking)
         seconds = positive(delay, f"{where}: delay")
         steps = math.ceil(seconds * positive(rate, f"{where}: rate")) + 2
         places = counted(fixes, f"{where}: fixes")
@@ -126,18 +126,15 @@ class PoseFilter:
         if gate is not None:
             gates[:] = gates_of(scalar(gate, f"{where}: gate", above=0.0, below=1.0))
         self._joints = self._odometry.q
-        noise = Noise(self._odometry.shares, variances, slips**2, np.array([gyro, walk, drift]) ** 2)
-        sizes = steps, places, d
+        sizes = steps, places, len(P)
         self._blocks = rings.new_history(
             self._odometry.record, noise, gates, seconds, sizes, self._joints[:3]
         )
         self._history = views(rings.History, *self._blocks, 0)
         self._advance = checked_by_caller(rings.advance, rings.ADVANCE)
         self._add_fix = checked_by_caller(rings.add_fix, rings.ADD_FIX)
-        self._still = np.zeros(k)
-        x, P = np.zeros(d), np.zeros((d, d))
-        P[3:, 3:] = np.diag([bias**2, *np.full(d - 4, scale**2)])
-        self._start(scalar(t, f"{where}: t"), self._joints[:3], covariance, x, P)
+        self._still = np.zeros(len(self.counters))
+        self._start(scalar(t, f"{where}: t"), self._joints[:3], covariance, np.zeros(len(P)), P)
 
     def _start(self, t: float, pose: ArrayLike, covariance: ArrayLike, x: Array, P: Array) -> None:
         """Begin at t with a pose (3,), of covariance (3, 3), and else with x (d,) and P (d, d)."""
@@ -278,7 +275,7 @@ class PoseFilter:
     @property
     def state_covariance(self) -> Array:
         """(d, d) of the error: along and across the platform, m, of theta, rad, of the bias, rad/s, and of
-        the scales."""
+        the scales, the turns' last."""
         return self._P.copy()
 
     @property
@@ -304,8 +301,14 @@ class PoseFilter:
     def scales(self) -> dict[str, float]:
         """By which each counter's turning is multiplied, beside its `slip`; 1 where they are no part of the
         state."""
-        scales = 1.0 + self._x[4:] if len(self._x) > 4 else np.ones(len(self.counters))
+        k = len(self.counters)
+        scales = 1.0 + self._x[4 : 4 + k] if len(self._x) > 4 else np.ones(k)
         return dict(zip(self.counters, scales.tolist(), strict=True))
+
+    @property
+    def turn_scale(self) -> float:
+        """By which turns are multiplied; 1 where it is no part of the state."""
+        return 1.0 + float(self._x[-1]) if len(self._x) > 4 + len(self.counters) else 1.0
 
     @property
     def outliers(self) -> int:

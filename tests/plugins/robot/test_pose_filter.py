@@ -84,46 +84,59 @@ def test_every_platform_moves_as_its_odometry_and_its_noise_as_differences_of_it
     np.testing.assert_allclose(pose_filter.covariance, wanted, rtol=0, atol=1e-7 * np.abs(wanted).max())
 
 
-def test_a_gyro_is_what_joint_gaussians_make_of_it() -> None:
-    """Unknowns: the pose before, bias, scales, what the wheels and the slip of this step were. They are
-    conditioned on the gyro, and carried on by differences of the motion."""
+@pytest.mark.parametrize(("of_turns", "off"), [(0.0, 1e-10), (0.05, 1e-5)])
+def test_a_gyro_is_what_joint_gaussians_make_of_it(of_turns: float, off: float) -> None:
+    """Unknowns: the pose before, bias, scales, the scale of turns, what the wheels and the slip of this step
+    were. They are conditioned on the gyro, and carried on by differences of the motion. That is linear in the
+    scales; of the scales of turns and of counters the filter leaves out the product of their corrections."""
     pose, turned, dt, rate = np.array([0.5, 1.0, 0.7]), np.array([1.0, 1.4]), 0.2, 0.5
     spread, slip, noise, bias, scale = np.array([1e-3, 2e-3]), np.array([0.02, 0.01, 0.03]), 0.05, 0.1, 0.02
-    names = [*STILL]
     pose_filter = make(
-        pose, KNOWN, spread=dict(zip(names, spread, strict=True)), slip_noise=slip, gyro_noise=noise,
+        pose, KNOWN, spread=dict(zip(STILL, spread, strict=True)), slip_noise=slip, gyro_noise=noise,
         bias_deviation=bias, bias_walk=0.01, scale_deviation=scale, scale_walk=0.002,
+        turn_deviation=of_turns, turn_walk=0.1 * of_turns,
     )  # fmt: skip
-    pose_filter.fix(
-        pose + np.array([0.1, -0.1, 0.1]), np.diag([0.02, 0.02, 0.1]), 0.0
-    )  # what is known is correlated
-    first, P = pose_filter.pose, pose_filter.state_covariance
-    T = matrix_of(first)
+    pose_filter.step(dt, [2.0, 1.0])
+    off_by = np.array([0.2, -0.2, 0.3])
+    pose_filter.fix(pose_filter.pose + off_by, np.diag([0.02, 0.02, 0.1]), dt)  # all is correlated
+    first, P, b = pose_filter.pose, pose_filter.state_covariance, pose_filter.bias
+    T, d, scales = matrix_of(first), len(P), np.array([*pose_filter.scales.values()])
+    of_turn = pose_filter.turn_scale
+    assert d == (7 if of_turns else 6)
 
     def motion(v: Array) -> Array:
-        """The twist with scales v[4:6], counts v[6:8] and slip v[8:]."""
-        return twist_of(turned * (1 + v[4:6]) + v[6:8]) + v[8:]
+        """The twist with corrections of scales v[4:6], of turns v[6:d], counts v[d : d + 2] and slip."""
+        twist = twist_of(turned * (scales + v[4:6]) + v[d : d + 2])
+        twist[2] *= of_turn + sum(v[6:d])
+        return twist + v[d + 2 :]
 
-    way, turn = twist_of(turned)[0], abs(twist_of(turned)[2])
-    counts = spread * turned
-    prior = np.zeros((11, 11))
-    prior[:6, :6], prior[6:8, 6:8] = P, np.diag(counts)
-    prior[8:, 8:] = np.diag(slip**2 * [way, way, turn])
-    H = difference(lambda v: motion(v)[2:] + v[3] * dt, np.zeros(11))
-    seen = rate * dt - motion(np.zeros(11))[2:]
+    still = np.zeros(d + 5)
+    way, turn = motion(still)[0], abs(motion(still)[2])
+    prior = np.zeros((d + 5, d + 5))
+    prior[:d, :d], prior[d : d + 2, d : d + 2] = P, np.diag(spread * turned)
+    prior[d + 2 :, d + 2 :] = np.diag(slip**2 * [way, way, turn])
+    H = difference(lambda v: motion(v)[2:] + v[3] * dt, still)
+    seen = (rate - b) * dt - motion(still)[2:]
     mean, spread_after = conditioned(prior, seen, H, np.array([[noise**2 * dt]]))
 
     def end(v: Array) -> Array:
         return T @ exp(v[:3]) @ exp(motion(v))
 
     believed = end(mean)
-    J = np.vstack([difference(lambda v: log(np.linalg.inv(believed) @ end(v)), mean), np.eye(3, 11, 3)])
-    expected = J @ spread_after @ J.T + np.diag([0, 0, 0, 0.01**2, 0.002**2, 0.002**2]) * dt
-    pose_filter.step(dt, turned, yaw_rate=rate)
-    np.testing.assert_allclose(matrix_of(pose_filter.pose), believed, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(pose_filter.bias, mean[3], rtol=0, atol=1e-12)
-    np.testing.assert_allclose([*pose_filter.scales.values()], 1 + mean[4:6], rtol=0, atol=1e-12)
-    np.testing.assert_allclose(pose_filter.state_covariance, expected, rtol=0, atol=1e-9)
+    J = np.vstack(
+        [difference(lambda v: log(np.linalg.inv(believed) @ end(v)), mean), np.eye(d - 3, d + 5, 3)]
+    )
+    walks = np.array([0, 0, 0, 0.01, 0.002, 0.002, *[0.1 * of_turns] * (d - 6)]) ** 2
+    pose_filter.step(2 * dt, turned, yaw_rate=rate)
+    np.testing.assert_allclose(matrix_of(pose_filter.pose), believed, rtol=0, atol=off)
+    np.testing.assert_allclose(pose_filter.bias, b + mean[3], rtol=0, atol=1e-12)
+    np.testing.assert_allclose([*pose_filter.scales.values()], scales + mean[4:6], rtol=0, atol=1e-12)
+    assert pose_filter.turn_scale == pytest.approx(of_turn + sum(mean[6:d]), abs=1e-12)
+    expected = J @ spread_after @ J.T + np.diag(walks) * dt
+    np.testing.assert_allclose(pose_filter.state_covariance, expected, rtol=0, atol=max(off, 1e-9))
+    for name, value in zip(STILL, scales, strict=True):
+        assert abs(value - 1.0) > 1e-5, name
+    assert (abs(of_turn - 1.0) > 1e-5) == (of_turns > 0.0)
 
 
 @pytest.mark.parametrize(
