@@ -129,7 +129,8 @@ def test_rows_hold_where_a_last_digit_of_the_scale_moves_them(rng: np.random.Gen
     )
     wheels = np.array([[25.0, -7.0, 0.0, 0.0, 0.0], [25.0, 7.0, 0.0, 0.0, 0.0]]) / 3.0
     limits = {"u_lower": [-np.inf, -np.inf, *[-1.5] * 3], "u_upper": [np.inf, np.inf, *[1.5] * 3]}
-    rows = {"limit_rows": wheels, "lower": [-2.0, -2.0], "upper": [2.0, 2.0]}
+    G = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
+    rows = {"limit_rows": G, "lower": [-9.0] * 3, "upper": [0.2, 0.2, 0.1]}
     worst = 0.0
     for _ in range(200):
         near = [part * (1.0 + 1e-6 * rng.normal(size=part.shape)) for part in (J, rate, h)]
@@ -137,3 +138,18 @@ def test_rows_hold_where_a_last_digit_of_the_scale_moves_them(rng: np.random.Gen
         assert found.status is Status.RELAXED
         worst = max(worst, float((np.abs(wheels @ found.u) - 2.0).max()))
     assert worst <= 1e-11
+
+
+@pytest.mark.parametrize(("levels", "excess"), [([0, 0, 1], 0.3), ([0, 0, 0], 0.4)])
+def test_limits_that_contradict_give_way_by_what_those_that_are_always_kept_ask(
+    levels: list[int], excess: float
+) -> None:
+    """u0 is 0.5, beyond 0.2 and 0.1: the least excess of the limits of level 0 is that of u1, too."""
+    bounds = {"u_lower": [0.5, -2.0, -2.0], "u_upper": [0.5, 2.0, 2.0]}
+    rows = {
+        "limit_rows": [[1.0, 0, 0], [0, 1.0, 0], [1.0, 0, 0]],
+        "lower": [-9.0] * 3,
+        "upper": [0.2, 0.2, 0.1],
+    }
+    problem = Problem([[0.0, 1.0, 0.0]], [1.0], np.zeros(3), **bounds, **rows, limit_levels=levels)
+    np.testing.assert_allclose(ProjectedGradient().resolve(problem).u, [0.5, 0.2 + excess, 0.0], atol=1e-12)

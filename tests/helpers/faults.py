@@ -81,7 +81,7 @@ FAULTS = [
     Fault("nmm/control/limits/bounds.py", "least = problem.before[j] - limits.falling[j] * elapsed", "least = problem.before[j] - limits.rising[j] * elapsed", "control/test_limits_sides.py::test_inputs_fall_and_rise_by_no_more_than_each_side control/test_limits_sides.py::test_a_stop_brakes_as_hard_as_its_side_lets_it"),
     Fault("nmm/control/limits/bounds.py", "rate += steered * G[steer, j]", "rate += 0.0 * G[steer, j]", "control/test_limits_kinds.py::test_wheels_turn_as_fast_as_their_rows_say"),
     Fault("nmm/control/limits/bounds.py", "brakings(limits, i, problem.limit_rows[w + i])", "brakings(limits, i, problem.limit_rows[i])", "control/test_limits_kinds.py::test_functions_stay_between_their_limits control/test_limits_kinds.py::test_the_height_of_a_frame"),
-    Fault("nmm/control/resolvers/saturation.py", "if problem.limit_levels[i] == 0:", "if problem.limit_levels[i] >= 0:", "control/test_limits_kinds.py::test_a_wall_that_wheels_cannot_avoid_is_broken_as_little_as_can_be_and_told control/test_priorities.py"),
+    Fault("nmm/control/resolvers/saturation.py", "if problem.limit_levels[i] == 0:", "if problem.limit_levels[i] >= 0:", "control/test_limits_kernel.py::test_limits_that_contradict_give_way_by_what_those_that_are_always_kept_ask"),
     Fault("nmm/control/resolvers/saturation.py", "answer.nu[level] *= scale", "answer.nu[level] = 1.0", "control/test_limits_kept.py::test_each_resolver_finds_its_own_optimum control/test_limits_kept.py::test_the_recorded_scale_is_the_share_of_the_rate_also_where_rest_is_not_allowed"),
     # Resolvers
     Fault("nmm/control/resolvers/projected_gradient.py", "u0[j] = -alpha * problem.h[j]", "u0[j] = alpha * problem.h[j]", RESOLVERS),
