@@ -177,6 +177,10 @@ class _Socket(tornado.websocket.WebSocketHandler, _Local):
                 await asyncio.sleep(PERIOD)
         except tornado.websocket.WebSocketClosedError:
             server.pages.discard(self)
+        except Exception:  # a page without pictures says that its program has ended
+            server.pages.discard(self)
+            self.close()
+            raise
 
     def on_message(self, message: str | bytes) -> None:
         if self.visitor is not None and self.visitor.heard(message):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from contextlib import AbstractContextManager
 from typing import Any
 
@@ -19,6 +20,7 @@ import nmm
 from nmm.base.resolver_style import resolver_styles
 from nmm.model.robots.configuration import Configuration
 from nmm.plugins.live.driving import DriveSetup, RobotSetup, ScenarioSetup, drive
+from nmm.plugins.live.driving.driven import Driven
 
 #: Where a point of a gizmo is in the window, px: its ball, or the tip of the arrow along an axis.
 WHERE = """([target, way, length]) => {
@@ -486,6 +488,74 @@ def test_a_program_that_has_ended_is_seen_and_its_controls_are_dead(
     page.keyboard.press("ArrowRight")
     np.testing.assert_array_equal(target(page), before)
     assert page.evaluate("document.getElementById('drive').inert")
+
+
+#: How long after the last picture the page says that none comes, ms, and how late its clock was meanwhile.
+WATCH = """() => {
+  const inner = nmm.hooks.drive;
+  let [last, late, beat] = [performance.now(), 0, performance.now()]; // they come thirty a second
+  nmm.hooks.drive = (picture) => {
+    [last, late] = [performance.now(), 0];
+    inner(picture);
+  };
+  setInterval(() => {
+    const now = performance.now();
+    late += Math.max(0, now - beat - 20);
+    beat = now;
+    if (nmm.silent && window.noticed === undefined) window.noticed = [now - last, late];
+  }, 20);
+}"""
+
+
+def test_a_robot_that_does_not_answer_is_seen_and_begins_again(
+    window: Window, setup: ScenarioSetup, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    going = threading.Event()
+    going.set()
+    step = Driven.step
+    monkeypatch.setattr(Driven, "step", lambda driven: going.wait() and step(driven))
+    with driven(setup) as url:
+        try:
+            page = opened(window, url)
+            page.wait_for_function("nmm.drive.time > 0.5")
+            page.evaluate(WATCH)
+            going.clear()
+            page.wait_for_function("window.noticed !== undefined", timeout=1000.0 * MOST)
+            apart, late = page.evaluate("window.noticed")
+            assert apart < 1000.0 + late
+            told = page.locator("#told")
+            assert "does not answer" in told.inner_text()
+            assert "bad" in str(told.get_attribute("class"))
+            dead = "id => document.getElementById(id).closest('[inert]') !== null"
+            assert all(page.evaluate(dead, name) for name in ("pause", "plan", "choices"))
+            before, stood = target(page), page.evaluate("nmm.drive.time")
+            drag(page, place(page, 0, "", 0.0), (30.0, 10.0))
+            page.keyboard.press("ArrowRight")
+            np.testing.assert_array_equal(target(page), before)
+            page.locator("#again").click()
+        finally:
+            going.set()
+        page.wait_for_function("!nmm.silent && !document.getElementById('told').classList.contains('bad')")
+        page.wait_for_function(f"0 < nmm.drive.time && nmm.drive.time < {stood}", timeout=1000.0 * MOST)
+        assert not page.evaluate(dead, "plan")
+        page.keyboard.press("ArrowRight")
+        assert target(page)[0] > before[0]
+
+
+def test_a_plan_where_the_robot_is_ends_and_the_page_lives(window: Window, setup: ScenarioSetup) -> None:
+    with driven(setup) as url:
+        page = opened(window, url)
+        arrived(page)
+        page.keyboard.press("t")
+        page.locator("#plan").click()
+        page.wait_for_function(
+            "document.getElementById('told').textContent.includes(\"plan's end\")", timeout=1000.0 * MOST
+        )
+        page.locator("#plan").click()
+        time = page.evaluate("nmm.drive.time")
+        page.locator("#again").click()
+        page.wait_for_function(f"nmm.drive.time < {time}", timeout=1000.0 * MOST)
+        assert not page.evaluate("nmm.silent")
 
 
 #: A gamepad as a browser gives it: axes 0 and 1 of the left stick, 2 and 3 of the right one.

@@ -24,11 +24,11 @@ from tornado.websocket import websocket_connect
 
 import nmm
 from nmm.base.arrays import Array
-from nmm.base.errors import InputError, ScenarioError
+from nmm.base.errors import InputError, RunError, ScenarioError
 from nmm.base.kinds import RESOLVERS
 from nmm.model.robots.configuration import Configuration
 from nmm.plugins.live.driving.driven import Driven, TargetProgress
-from nmm.plugins.live.driving.planning import Planning
+from nmm.plugins.live.driving.planning import Planning, later
 from nmm.plugins.live.driving.session import Aim, DriveSession, Order, Pick, parsed
 from nmm.plugins.live.driving.setups import DriveSetup, RobotSetup, ScenarioSetup, Settings
 from nmm.views.playback.rolling import Rolling
@@ -658,6 +658,50 @@ def test_a_function_that_raises_stops_the_robot_and_not_the_loop() -> None:
         wait_for(lambda: loop.picture()["told"] and not loop.picture()["wrong"])
         t = loop.picture()["t"]
         wait_for(lambda: loop.picture()["t"] > t)
+
+
+@pytest.mark.parametrize(
+    ("owner", "name", "kind"),
+    [
+        (Driven, "step", ValueError),
+        (Driven, "step", SystemExit),
+        (Driven, "look", ValueError),
+        (Driven, "restart", ValueError),
+        (Planning, "words", ValueError),
+        (DriveSession, "_values", ValueError),
+    ],
+)
+def test_nothing_that_goes_wrong_ends_the_loop(
+    monkeypatch: pytest.MonkeyPatch, owner: type, name: str, kind: type[BaseException]
+) -> None:
+    """It is told, and the robot begins again where nothing is wrong any more."""
+    with Loop(scenario()) as loop:
+        wait_for(lambda: loop.picture()["t"] > 0.1)
+        with monkeypatch.context() as meanwhile:
+
+            def raises(*_: object) -> None:
+                raise kind("it went wrong")
+
+            meanwhile.setattr(owner, name, raises)
+            loop.session.receive('{"type":"order","what":"plan"}')
+            loop.session.receive('{"type":"order","what":"restart"}')
+            wait_for(lambda: "it went wrong" in str(loop.picture()["told"]))
+            assert loop.picture()["wrong"]
+            count = loop.session._count
+            wait_for(lambda: loop.session._count > count + 3)  # there are pictures all the same
+        loop.session.receive('{"type":"order","what":"react"}')
+        loop.session.receive('{"type":"order","what":"restart"}')
+        wait_for(lambda: "it went wrong" not in str(loop.picture()["told"]))
+        t = loop.picture()["t"]
+        wait_for(lambda: loop.picture()["t"] > t)
+
+
+def test_work_that_ends_its_thread_has_a_result() -> None:
+    def ends() -> None:
+        raise SystemExit("no more")
+
+    with pytest.raises(RunError, match="no more"):
+        later(ends).result(timeout=MOST)
 
 
 # the command

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from nmm.base.arrays import Array
-from nmm.base.errors import NmmError
+from nmm.base.errors import NmmError, RunError
 from nmm.control.controller import Controller
 from nmm.control.functions.references import Constant
 from nmm.control.functions.references.live_target import LiveTarget
@@ -54,8 +54,8 @@ def later(work: Callable[[], T]) -> Future[T]:
     def run() -> None:
         try:
             future.set_result(work())
-        except Exception as error:  # who asks for the result gets it
-            future.set_exception(error)
+        except BaseException as error:  # who asks for the result gets it, also where a program ended itself
+            future.set_exception(error if isinstance(error, Exception) else RunError(why(error)))
 
     threading.Thread(target=run, daemon=True).start()
     return future

@@ -242,16 +242,23 @@ class DriveSession(RobotSession):
         driven, dt, owed = self._driven, self._driven.setup.dt, 0.0
         while not self.ended.is_set():
             self._aimed.clear()
-            self._attend()
+            try:
+                self._attend()
+            except Exception as error:  # of what a page or a plan asked for; the robot goes on
+                self._note(error)
             passed = self.clock.passed()
             owed = 0.0 if self._paused or driven.trouble else owed + passed
-            while owed >= dt and driven.step():
-                owed -= dt
             try:
+                while owed >= dt and driven.step():
+                    owed -= dt
                 self._look = driven.look()
-            except NmmError as error:  # a user's function may raise
-                driven.trouble = str(error)
-            self._publish(self._look)
+            except (Exception, SystemExit) as error:  # a user's function may raise whatever it likes
+                driven.trouble = why(error)
+            try:
+                self._publish(self._look)
+            except Exception as error:  # the page gets the picture before, and why
+                self._note(error)
+                self._repeat()
             try:
                 self.changed()
             except NmmError:  # the server has been closed
@@ -259,6 +266,15 @@ class DriveSession(RobotSession):
             if self.clock.rest(self._aimed):
                 # What is aimed at shows one step later, not when the next picture is due.
                 self.ended.wait(self.clock.until(dt - owed))
+
+    def _note(self, error: Exception) -> None:
+        self._notice, self._until = why(error), time.monotonic() + NOTICE
+
+    def _repeat(self) -> None:
+        """The picture before, with what went wrong with this one."""
+        if self._picture is not None:
+            placed, picture = self._picture
+            self._picture = placed, {**picture, "told": self._notice, "wrong": True}
 
     def _attend(self) -> None:
         while self._waiting:
@@ -286,7 +302,7 @@ class DriveSession(RobotSession):
                 self._driven.use(self._making.result())
                 self._planning.begin_again()
             except Exception as error:
-                self._notice, self._until = why(error), time.monotonic() + NOTICE
+                self._note(error)
             self._making = None
             # A page whose choice was refused shows the present one again.
             self._choices = (self._choices[0] + 1, self._driven.choices)
@@ -302,7 +318,7 @@ class DriveSession(RobotSession):
         except Exception as error:  # what goes wrong with a plan ends the plan, not the loop
             self._planning.turn(False)
             self._plan = self._planning.number, encode(NO_PLAN)
-            self._notice, self._until = why(error), time.monotonic() + NOTICE
+            self._note(error)
 
     def _publish(self, look: DrivenState) -> None:
         driven = self._driven

@@ -1,7 +1,7 @@
 // What the page is told to draw. Commands come as lines of JSON, from the page itself or from a socket, and
 // are carried out in order and at once; those not known here are MeshCat's.
 "use strict";
-const nmm = (window.nmm = { hooks: {}, geometries: {}, endings: [], ended: false });
+const nmm = (window.nmm = { hooks: {}, geometries: {}, endings: [], ended: false, silent: false });
 
 {
   const view = document.getElementById("view");

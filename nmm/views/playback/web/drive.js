@@ -16,7 +16,31 @@
   nmm.plots.zoom = () => {};
 
   const send = (message) => nmm.send && nmm.send(message);
-  const order = (what) => send({ type: "order", what });
+  const order = (what) => (!nmm.silent || what === "restart") && send({ type: "order", what });
+
+  // A program that sends no picture does not hear either, for now; only to begin again may wait for it. Only time
+  // counts in which the page itself could have heard: a busy one is late for its pictures, and for this.
+  const [TICK, SILENCE] = [100, 700]; // ms
+  let [heard, silence, ticked] = [0, 0, 0];
+  function hear() {
+    heard = ticked = performance.now();
+    silence = 0;
+    if (nmm.silent) fall(false);
+  }
+  function tick() {
+    const now = performance.now();
+    silence += Math.min(now - ticked, 2 * TICK);
+    ticked = now;
+    if (nmm.ended || silence < SILENCE) return;
+    if (!nmm.silent) fall(true);
+    const told = `The robot does not answer, since ${Math.round((now - heard) / 1000)} s`;
+    if (parts.told.textContent !== told) parts.told.textContent = told;
+    parts.told.classList.add("bad");
+  }
+  function fall(silent) {
+    nmm.silent = silent;
+    for (const part of panel.querySelectorAll("#pause, #plan, fieldset, #choices")) part.inert = silent;
+  }
 
   // What is aimed at goes out at once, but for what follows within a few ms: that goes with the next picture.
   const SOON = 4;
@@ -28,7 +52,7 @@
     told = performance.now();
   }
   function aim(target, value) {
-    if (nmm.ended) return;
+    if (nmm.ended || nmm.silent) return;
     target.value = value;
     target.since = performance.now();
     target.awaited = ++count;
@@ -139,6 +163,8 @@
     };
     const seen = nmm.camera.also;
     nmm.camera.also = () => [...seen(), ...drive.targets.filter((target) => target.gizmo).map((target) => upright(target.gizmo.place.toArray()))];
+    hear();
+    setInterval(tick, TICK);
     if (!nmm.camera.following) nmm.actions.follow();
     nmm.plots.show(true);
     nmm.camera.reset();
@@ -223,7 +249,8 @@
     if (drive.plan) drive.followed += 1;
   };
 
-  nmm.hooks.drive = ({ t, targets, heard, at, samples, paused, plans, told, wrong }) => {
+  nmm.hooks.drive = ({ t, targets, heard: known, at, samples, paused, plans, told, wrong }) => {
+    hear();
     remember(samples);
     drive.plans = plans;
     parts.plan.setAttribute("aria-pressed", String(plans));
@@ -234,7 +261,7 @@
     drive.targets.forEach((target, i) => {
       target.at = at[i];
       // Pictures on their way know nothing of what has just been aimed at, even where the target has been there before.
-      if (heard[i] === target.awaited || performance.now() - target.since > PATIENCE) target.awaited = undefined;
+      if (known[i] === target.awaited || performance.now() - target.since > PATIENCE) target.awaited = undefined;
       const busy = target.awaited !== undefined || (nmm.gizmos.held && nmm.gizmos.held.gizmo === target.gizmo);
       if (!busy) {
         target.value = targets[i];

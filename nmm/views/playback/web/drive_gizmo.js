@@ -150,7 +150,7 @@
   }
 
   view.addEventListener("pointerdown", (event) => {
-    const hit = event.button === 0 && !nmm.ended ? found(event) : null;
+    const hit = event.button === 0 && !nmm.ended && !nmm.silent ? found(event) : null;
     if (hit === null) return;
     event.stopPropagation();
     event.preventDefault();
@@ -173,7 +173,7 @@
   view.addEventListener("pointermove", (event) => {
     const { held } = gizmos;
     if (held === null) {
-      const hit = event.buttons === 0 && !nmm.ended ? found(event) : null;
+      const hit = event.buttons === 0 && !nmm.ended && !nmm.silent ? found(event) : null;
       view.style.cursor = hit ? "grab" : "";
       return light(hit);
     }
