@@ -277,3 +277,25 @@ def test_white_space_ahead_of_an_srdfs_declaration(tmp_path: Path) -> None:
     text = f'\n<?xml version="1.0"?><robot name="r">{group(links("lower"))}</robot>'
     made = nmm.load(tree(tmp_path), srdf=write(tmp_path / "given.srdf", text))
     assert made.semantics.groups == {"g": ("elbow",)}
+
+
+def test_groups_in_groups_are_resolved_once(tmp_path: Path) -> None:
+    """Each of 60 holds the one before twice, and each of 3,000 the one before: no more work than groups."""
+    inner = '<joint name="elbow"/>'
+    text = group(inner, "a0") + group('<joint name="shoulder"/>', "b0")
+    text += "".join(group(f'<group name="a{k}"/><group name="a{k}"/>', f"a{k + 1}") for k in range(60))
+    text += "".join(group(f'<group name="b{k}"/>', f"b{k + 1}") for k in range(3_000))
+    groups = with_srdf(tmp_path, text).groups
+    assert groups["a60"] == ("elbow",)
+    assert groups["b3000"] == ("shoulder",)
+
+
+def test_groups_in_a_circle_hold_all_of_it(tmp_path: Path) -> None:
+    names = [f"c{k}" for k in range(4)]
+    joints = ["shoulder", "elbow", "grip", "pan"]
+    text = "".join(
+        group(f'<joint name="{joint}"/><group name="{after}"/>', name)
+        for name, after, joint in zip(names, [*names[1:], names[0]], joints, strict=True)
+    )
+    groups = with_srdf(tmp_path, text).groups
+    assert all({*groups[name]} == {*joints} for name in names)

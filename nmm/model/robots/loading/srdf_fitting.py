@@ -249,8 +249,7 @@ def _place(numbers: Sequence[float], robot: Robot) -> dict[str, float]:
 def _groups(groups: Mapping[str, Group], robot: Robot, base: set[str]) -> dict[str, tuple[str, ...]]:
     """The inputs of each group that has some: of the platform all for a joint of its base."""
     usable = {}
-    for name in groups:
-        joints = _members(name, groups, robot, ())
+    for name, joints in _members(groups, robot, {*robot.q_names, *base}).items():
         inputs = tuple(
             u_name
             for k, (u_name, i) in enumerate(zip(robot.u_names, robot.rate_coordinates, strict=True))
@@ -275,21 +274,49 @@ def _free_names(groups: Mapping[str, tuple[str, ...]], robot: Robot) -> dict[str
     return renamed
 
 
-def _members(name: str, groups: Mapping[str, Group], robot: Robot, above: tuple[str, ...]) -> set[str]:
-    """The joints of a group, fixed ones too; none for an unknown or circular one. A link stands for the joint
-    that carries it, a chain for the joints between its links."""
-    if name in above or name not in groups:
-        return set()
-    group = groups[name]
-    return {*group.joints}.union(
-        *(_above(robot, link)[:1] for link in group.links),
-        *(
-            {*_above(robot, tip)} ^ {*_above(robot, base)}
-            for base, tip in group.chains
-            if {base, tip} <= {*robot.frames}
-        ),
-        *(_members(member, groups, robot, (*above, name)) for member in group.groups),
-    )
+def _members(groups: Mapping[str, Group], robot: Robot, known: set[str]) -> dict[str, set[str]]:
+    """Of the known joints, those of each group and of the groups in it; these may form a circle.
+    A link stands for the joint that carries it, a chain for the joints between its links."""
+    frames = {*robot.frames}
+    members = {
+        name: known.intersection(
+            set(group.joints).union(
+                *(_above(robot, link)[:1] for link in group.links),
+                *(
+                    {*_above(robot, tip)} ^ {*_above(robot, base)}
+                    for base, tip in group.chains
+                    if {base, tip} <= frames
+                ),
+            )
+        )
+        for name, group in groups.items()
+    }
+    order, grown = _inner_first(groups), True
+    while grown:  # twice, and more often only in circles
+        before = sum(map(len, members.values()))
+        for name in order:
+            members[name].update(*(members.get(inner, ()) for inner in groups[name].groups))
+        grown = sum(map(len, members.values())) > before
+    return members
+
+
+def _inner_first(groups: Mapping[str, Group]) -> list[str]:
+    """The groups' names, each behind those that it holds, but for circles."""
+    order, seen = [], set[str]()
+    for start in groups:
+        path = [start] if start not in seen else []
+        inside = [iter(groups[start].groups)]
+        seen.add(start)
+        while path:
+            following = next((name for name in inside[-1] if name in groups and name not in seen), None)
+            if following is None:
+                order.append(path.pop())
+                inside.pop()
+            else:
+                seen.add(following)
+                path.append(following)
+                inside.append(iter(groups[following].groups))
+    return order
 
 
 def _above(robot: Robot, link: str) -> list[str]:
