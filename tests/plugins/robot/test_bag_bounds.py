@@ -5,14 +5,16 @@ from __future__ import annotations
 import bz2
 import io
 import os
+import sqlite3
 import struct
 import zipfile
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 import pytest
-from robot_logs import bag, joints, odom, wheeled
-from rosbags import rosbag2
+from robot_logs import FIRST, STORE, bag, joints, odom, wheeled
+from rosbags import rosbag1, rosbag2
 
 import nmm
 from nmm.base.errors import InputError
@@ -93,3 +95,75 @@ def test_an_array_whose_header_claims_more_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="its header claims") as error:
         read_arrays(tmp_path / "a.npz")
     assert "t" in str(error.value)
+
+
+def packed(folder: Path, kind: str) -> Path:
+    """A log that is compressed by message, by file, or as ROS 1 does."""
+    first = kind in ("bz2", "lz4")
+    store = FIRST if first else STORE
+    if first:
+        log = rosbag1.Writer(folder / "a.bag")
+        log.set_compression(getattr(rosbag1.Writer.CompressionFormat, kind.upper()))
+    else:
+        log = rosbag2.Writer(folder / "a", version=9, storage_plugin=rosbag2.StoragePlugin.SQLITE3)
+        log.set_compression(getattr(rosbag2.CompressionMode, kind.upper()), rosbag2.CompressionFormat.ZSTD)
+    with log:
+        kinds = {"/joint_states": "sensor_msgs/msg/JointState", "/odom": "nav_msgs/msg/Odometry"}
+        topics = {name: log.add_connection(name, kind, typestore=store) for name, kind in kinds.items()}
+        serialize = store.serialize_ros1 if first else store.serialize_cdr
+        for k in range(50):
+            t = 0.1 * k
+            position = {"j1": 0.1, "j2": 0.01 * k}
+            for name, message in (
+                ("/joint_states", joints(t, position, store=store)),
+                ("/odom", odom(t, (0.0, 0.0, 0.0), store=store)),
+            ):
+                log.write(topics[name], round(t * 1e9), serialize(message, kinds[name]))
+    return log.path
+
+
+@pytest.mark.parametrize("kind", ["message", "file", "bz2", "lz4"])
+def test_what_is_decompressed_in_all_is_bounded(
+    tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, robot = packed(tmp_path, kind), wheeled(tmp_path)
+    read = nmm.read_bag(path, robot)
+    np.testing.assert_allclose(read.q[-1, -1], 0.49, atol=1e-12)
+    monkeypatch.setattr(chunks, "MOST_OF_ALL", 3_000)
+    monkeypatch.setattr(chunks, "MOST_TIMES", 0)
+    with pytest.raises(InputError, match="decompressed") as error:
+        nmm.read_bag(path, robot)
+    assert len(str(error.value)) <= 300
+
+
+def test_a_file_is_decompressed_as_far_as_the_disk_has_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, robot = packed(tmp_path, "file"), wheeled(tmp_path)
+    monkeypatch.setattr(chunks, "SHARE_OF_DISK", 0.0)
+    with pytest.raises(InputError, match="decompressed"):
+        nmm.read_bag(path, robot)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "ALTER TABLE messages RENAME TO m; CREATE VIEW messages AS WITH RECURSIVE n(i) AS "
+        "(VALUES (1) UNION ALL SELECT i + 1 FROM n) SELECT m.id, topic_id, timestamp, data FROM m, n",
+        "ALTER TABLE messages ADD COLUMN more AS (zeroblob(1000000000))",
+        "CREATE VIRTUAL TABLE more USING dbstat",
+    ],
+    ids=["view", "computed column", "virtual table"],
+)
+def test_rows_that_are_computed_are_refused(tmp_path: Path, change: str) -> None:
+    """They may be without end, and fill no file."""
+    folder, robot = logged(tmp_path, mcap=False), wheeled(tmp_path)
+    assert len(nmm.read_bag(folder, robot))
+    (file,) = folder.glob("*.db3")
+    with closing(sqlite3.connect(file)) as database:
+        try:
+            database.executescript(change)
+        except sqlite3.OperationalError as error:
+            pytest.skip(f"this sqlite cannot write it: {error}")
+    with pytest.raises(InputError, match="computed"):
+        nmm.read_bag(folder, robot)

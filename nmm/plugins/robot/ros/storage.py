@@ -12,6 +12,7 @@ from nmm.base.files import expect_file
 from nmm.base.findings import Finding
 from nmm.plugins.robot.ros.chunks import (
     MOST_OF_METADATA,
+    Allowance,
     bound_readers,
     check_claims,
     claims_of,
@@ -56,7 +57,7 @@ class Log:
         """All messages of those topics with those types, a file after another."""
         for part in self._parts:
             with _Refusing(part.path):
-                yield from part.messages(wanted)
+                yield from Allowance(part.path).over(part.messages(wanted))
             if isinstance(part, _Streamed) and part.reason:
                 self._tell(part.path, part.reason)
 
@@ -103,7 +104,7 @@ class _Indexed:
         first = path.suffix in (".bag", ".active")
         self._reader: Callable[[Path], Any] = rosbags("rosbag1" if first else "rosbag2").Reader
         self._decoded = of_ros1() if first else typestore().deserialize_cdr
-        with self._reader(path) as bag:
+        with Allowance(path).counting(), self._reader(path) as bag:
             for file, claims in claims_of(bag):
                 check_claims(file, claims)
             self.topics = [(connection.topic, connection.msgtype) for connection in bag.connections]
@@ -128,7 +129,8 @@ class _Streamed:
     def __init__(self, path: Path) -> None:
         self.path, self.reason = path, ""
         self._decoders = {"cdr": typestore().deserialize_cdr, "ros1": of_ros1()}
-        self.topics = [*dict.fromkeys((topic, kind) for topic, kind, _ in self._records() if topic)]
+        records = Allowance(path).over(self._records())
+        self.topics = [*dict.fromkeys((topic, kind) for topic, kind, _ in records if topic)]
         if not self.topics:
             raise InputError(self.reason or "has no topics", where=path)
 
