@@ -56,7 +56,7 @@ class Recorder:
         )
         self.found = room(count, *sizes)
         self.retreats = np.zeros(count, dtype=np.int64)
-        self.beyond: dict[int, dict[str, float]] = {}
+        self._beyond: dict[int, dict[str, float]] = {}
         self.against: dict[str, tuple[str, ...]] = {}
         self.findings: list[Finding] = []
         self.blocking: tuple[str, ...] = ()
@@ -82,7 +82,7 @@ class Recorder:
 
     def clear(self) -> None:
         self._count, self._compiled = 0, False
-        self.beyond.clear()
+        self._beyond.clear()
         self._places.clear()
         self.findings.clear()
 
@@ -113,6 +113,10 @@ class Recorder:
         return float(self._times[-1] - self._times[0])
 
     @property
+    def beyond(self) -> dict[int, dict[str, float]]:
+        return {k: beyond for k, beyond in self._beyond.items() if k < self._count}
+
+    @property
     def places(self) -> list[tuple[Any, ...]]:
         """Obstacles' places at the samples so far (`Scene.places`)."""
         return self._places[: self._count]
@@ -137,12 +141,13 @@ class Recorder:
         if (scene := self.controller.solver.scene) is not None:
             self._places[k:] = [scene.places(sample.t)]
         self.retreats[k] = sample.retreats
-        self.beyond.pop(k, None)
+        self._beyond.pop(k, None)
         if sample.excess > 0.0:
-            self.beyond[k] = beyond = self.controller.report.beyond()
+            beyond = self.controller.report.beyond()
             if not beyond.keys() <= self.against.keys():
                 against = self.controller.report.contradiction()
                 self.against |= dict.fromkeys(beyond.keys() - self.against.keys(), against)
+            self._beyond[k] = beyond  # last: Ctrl-C may come at any line
 
     def passed_over(self, last: int) -> None:
         self._compiled = True

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import sys
+from collections import Counter
+from types import FrameType
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
-from findings import codes, the, why
+from findings import codes, every, the, why
 from numpy import pi
 
 import nmm
 from nmm.control.integrators import METHODS
 from nmm.model.robots.robot import Robot
+from nmm.motion import recording
 from nmm.motion.diagnosis.assessment import instabilities
+
+if TYPE_CHECKING:
+    from _typeshed import TraceFunction
 
 START = {"x": -1, "y": -1, "theta": pi}
 CIRCLE = nmm.Circle([2, 2], 3, 0.08 * pi, 5 / 4 * pi)
@@ -160,6 +169,63 @@ def test_an_interrupted_run_keeps_what_it_has(robot_2r: Robot) -> None:
     assert 200 <= len(run) < 220
     assert why(run) == ["interrupted"]
     assert len(run.q) == len(run.u) == len(run.sigma_min) == len(run.t)
+
+
+#: What records a sample.
+WRITING = ("add", "replace_last", "_write", "hold", "passed_over")
+
+
+class InterruptAt:
+    """Ctrl-C at line number `left` of those that record samples, each counted at its first two visits."""
+
+    def __init__(self, left: int) -> None:
+        self.left = left
+        self._visits: Counter[int] = Counter()
+
+    def __call__(self, frame: FrameType, event: str, _: object) -> TraceFunction | None:
+        code = frame.f_code
+        return self.line if code.co_filename == recording.__file__ and code.co_name in WRITING else None
+
+    def line(self, frame: FrameType, event: str, _: object) -> TraceFunction:
+        self._visits[frame.f_lineno] += event == "line"
+        if event == "line" and self._visits[frame.f_lineno] <= 2:
+            self.left -= 1
+            if self.left == -1:
+                sys.settrace(None)
+                raise KeyboardInterrupt
+        return self.line
+
+
+def test_ctrl_c_at_any_line_that_records_leaves_a_whole_run() -> None:
+    """Where limits contradict each other, by turns, and distances change the inputs."""
+    robot = nmm.load("unicycle_2r")
+    x = nmm.Position("base_link", "x")
+    limits = nmm.Limits(
+        bounds=[nmm.Bound(x, 0.5, 1.0, name="corridor"), nmm.Bound(x, -1.0, -0.5, name="wall")]
+    )
+    ball = nmm.Obstacle(nmm.Sphere(0.1), [0.0, 0.0, 2.0])
+    task = nmm.Task(nmm.Position("ee", "xy"), [1.0, 0.5])
+    collisions = nmm.Collisions(0.03, obstacles=[ball])
+    controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=limits, collisions=collisions)
+    lines = 0
+    while True:
+        controller.reset()
+        interrupt = InterruptAt(lines)
+        sys.settrace(interrupt)
+        try:
+            run = nmm.simulate(controller, {"q1": 0.5, "q2": 0.5}, 0.01, 0.005)
+        finally:
+            sys.settrace(None)
+        if interrupt.left >= 0:
+            break
+        assert run.outcome is nmm.Outcome.INTERRUPTED
+        assert len(run.q) == len(run.u) == len(run.t)
+        contradicted = every(run, "limit_contradicted")
+        assert all(finding.where["t"] <= run.t[-1] for finding in contradicted)
+        lines += 1
+    assert lines > 20
+    assert run.complete
+    assert every(run, "limit_contradicted")
 
 
 def test_progress_goes_from_nothing_to_one(robot_2r: Robot) -> None:

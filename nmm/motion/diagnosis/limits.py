@@ -102,8 +102,9 @@ def not_kept(recorder: Recorder, controller: Controller) -> Iterator[Finding]:
     """Contradictory limits, retreats, an added task not done, a resolver without an answer."""
     times, recorded = recorder.t, recorder.so_far
     units = controller.solver.limits_on.rate_units
-    for name in dict.fromkeys(name for beyond in recorder.beyond.values() for name in beyond):
-        broken = {k: beyond[name] for k, beyond in recorder.beyond.items() if name in beyond}
+    excesses = recorder.beyond
+    for name in dict.fromkeys(name for beyond in excesses.values() for name in beyond):
+        broken = {k: beyond[name] for k, beyond in excesses.items() if name in beyond}
         values = {
             "name": name,
             "samples": len(broken),
