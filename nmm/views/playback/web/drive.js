@@ -18,22 +18,20 @@
   const send = (message) => nmm.send && nmm.send(message);
   const order = (what) => (!nmm.silent || what === "restart") && send({ type: "order", what });
 
-  // A program that sends no picture does not hear either, for now; only to begin again may wait for it. Only time
-  // counts in which the page itself could have heard: a busy one is late for its pictures, and for this.
-  const [TICK, SILENCE] = [100, 700]; // ms
-  let [heard, silence, ticked] = [0, 0, 0];
+  // A program that sends no picture does not hear either, for now; only to begin again may wait for it. What counts
+  // are a timer's turns without a picture: a page that is busy itself is late for both.
+  const [TICK, SILENCE] = [100, 7]; // ms, turns
+  let [heard, turns] = [0, 0];
   function hear() {
-    heard = ticked = performance.now();
-    silence = 0;
+    heard = performance.now();
+    turns = 0;
     if (nmm.silent) fall(false);
   }
   function tick() {
-    const now = performance.now();
-    silence += Math.min(now - ticked, 2 * TICK);
-    ticked = now;
-    if (nmm.ended || silence < SILENCE) return;
+    turns += 1;
+    if (nmm.ended || turns < SILENCE) return;
     if (!nmm.silent) fall(true);
-    const told = `The robot does not answer, since ${Math.round((now - heard) / 1000)} s`;
+    const told = `The robot does not answer, since ${Math.round((performance.now() - heard) / 1000)} s`;
     if (parts.told.textContent !== told) parts.told.textContent = told;
     parts.told.classList.add("bad");
   }
