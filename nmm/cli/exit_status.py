@@ -119,11 +119,14 @@ def main() -> NoReturn:
     # end, is a fifth of a short run's time.
     gc.set_threshold(1_000_000, 50, 50)
     tell_what_takes_long()
+    status: int | None = None
     try:
         raise_interrupts()
         status = status_of(sys.argv[1:])
-    except KeyboardInterrupt:  # just before, or just behind
-        status = _complain(_called(sys.argv[1:]), "interrupted", INTERRUPTED)
-    ignore_interrupts()
+        ignore_interrupts()
+    except KeyboardInterrupt:  # just before, or just behind: then it is done
+        ignore_interrupts()
+        if status is None:
+            status = _complain(_called(sys.argv[1:]), "interrupted", INTERRUPTED)
     gc.freeze()
     sys.exit(status)

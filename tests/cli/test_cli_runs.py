@@ -226,6 +226,53 @@ def test_ctrl_c_in_a_text_that_python_runs_ends_as_any_other(tmp_path: Path) -> 
     assert subprocess.run([sys.executable, "-m", "ended"], cwd=tmp_path).returncode == 130
 
 
+#: A command that is done, and asked to end at an instruction behind that: at the first, the second and so on.
+ENDED = """
+import os, signal, sys
+from nmm.cli import exit_status, interrupts
+FILES = exit_status.__file__, interrupts.__file__
+sys.argv = ["nmm", "run"]
+def ended_at(number):
+    done, left = [], [number]
+    exit_status.status_of = lambda arguments: done.append(0) or 0
+    def trace(frame, event, _):
+        if frame.f_code.co_filename not in FILES:
+            return None
+        frame.f_trace_opcodes = True
+        if event == "opcode" and done:
+            left[0] -= 1
+            if left[0] == -1:
+                os.kill(os.getpid(), signal.{name})
+        return trace
+    sys.settrace(trace)
+    try:
+        exit_status.main()
+    except SystemExit as ended:
+        return left[0] < 0, ended.code
+    except BaseException as error:
+        return left[0] < 0, repr(error)
+    finally:
+        sys.settrace(None)
+number = 0
+while (ended := ended_at(number))[0]:
+    print(ended[1])
+    number += 1
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_signal_when_all_is_done_prints_no_traceback(tmp_path: Path, name: str) -> None:
+    command = [sys.executable, "-c", ENDED.replace("{name}", name)]
+    ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=MOST)
+    lines = ended.stdout.split("\n")[:-1]
+    assert len(lines) > 20
+    # Before the command's own status is there, it is not known that it is done.
+    unknown = lines.count("130")
+    assert unknown <= 5
+    assert lines == ["130"] * unknown + ["0"] * (len(lines) - unknown)
+    assert ended.stderr == "nmm run: interrupted\n" * unknown
+
+
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 def test_ctrl_c_waits_for_an_import_that_would_swallow_it(tmp_path: Path, name: str) -> None:
     (tmp_path / "greedy.py").write_text(
