@@ -13,7 +13,7 @@ import typer
 
 from nmm.base.errors import InputError
 from nmm.base.kinds import RESOLVERS
-from nmm.base.text_format import listed
+from nmm.base.text_format import counted, listed
 from nmm.cli.groups import (
     AddedOptions,
     Browser,
@@ -41,7 +41,7 @@ from nmm.cli.options import (
     out_option,
     settings_of,
 )
-from nmm.cli.output import FAILED, OK, complain, print_table, progress, show_table, warn
+from nmm.cli.output import FAILED, INTERRUPTED, OK, complain, print_table, progress, show_table, warn
 
 if TYPE_CHECKING:
     from nmm.control.controller import Controller
@@ -211,6 +211,10 @@ def compare(
         trajectories.append(_run(made, controller, label=label))
         if trajectories[-1].outcome == "interrupted":
             break
+    missing = len(scenarios) - len(trajectories)
+    if missing and comparison.is_comparison(folder):
+        warn(f"{counted(missing, 'run')} of {len(scenarios)} did not begin: the comparison in {folder} stays")
+        return INTERRUPTED
     with shielded():
         comparison.save(trajectories, folder, name, **drawn)
     columns = [dict(describe(trajectory, trajectory.summary())) for trajectory in trajectories]

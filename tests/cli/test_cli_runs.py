@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import re
@@ -23,9 +24,11 @@ from small_pictures import draw_only
 import nmm
 import nmm.cli.runs
 from nmm.base.figure_options import FigureOptions
+from nmm.base.findings import Finding
 from nmm.cli.exit_status import status_of
 from nmm.cli.options import chosen, named
 from nmm.cli.runs import run as run_scenario
+from nmm.motion.verdict import Outcome, Verdict
 from nmm.plugins.live.cli import runs_in
 from nmm.views.tables import Table
 
@@ -291,6 +294,34 @@ def test_ctrl_c_waits_for_an_import_that_would_swallow_it(tmp_path: Path, name: 
 
 
 # compare
+
+
+def test_compare_that_is_interrupted_leaves_the_one_before(
+    run: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where nothing was before, what was computed is written."""
+    asked = ("compare", "unicycle_2r_position", *SHORT, "--out", "compared")
+    numbers = Path("compared/summary.json")
+
+    def interrupted(self: nmm.Scenario, *given: object, **more: object) -> nmm.Trajectory:
+        return dataclasses.replace(
+            through(self, *given, **more),
+            verdict=Verdict(Outcome.INTERRUPTED, (Finding("interrupted_judging"),)),
+        )
+
+    through = nmm.Scenario.run
+    with monkeypatch.context() as meanwhile:
+        meanwhile.setattr(nmm.Scenario, "run", interrupted)
+        assert run(*asked).status == 1
+        assert len(json.loads(numbers.read_text())["runs"]) == 1
+    assert run(*asked).status == 0
+    before = numbers.read_bytes()
+    with monkeypatch.context() as meanwhile:
+        meanwhile.setattr(nmm.Scenario, "run", interrupted)
+        result = run(*asked)
+    assert (result.status, result.out) == (130, "")
+    assert "1 run of 2 did not begin: the comparison in compared stays" in result.err
+    assert numbers.read_bytes() == before
 
 
 def test_compare_makes_one_table_one_figure_one_playback(run: Command) -> None:
