@@ -108,6 +108,28 @@ def late(by: float) -> dict[str, Any]:
     return {"measure": measure}
 
 
+def old(by: float) -> Callable[[float, np.ndarray], Measured]:
+    """Where the robot was so long ago, s, as if it were now."""
+    past: list[np.ndarray] = []
+
+    def measure(t: float, q: np.ndarray) -> Measured:
+        past.append(q)
+        return past[max(0, len(past) - 1 - round(by / PERIOD))], t
+
+    return measure
+
+
+def to_its_limit() -> nmm.Loop:
+    """q1 goes fast to its limit."""
+    loop = make_loop((-2.4, 1.6))
+    given = loop.controller.given
+    posture, resolver = nmm.PreferredPosture({"q1": 3.0, "q2": 0.9}), nmm.DampedLeastSquares(alpha=3.0)
+    controller = nmm.Controller(
+        given.robot, given.task, resolver, posture, limits=given.limits, kinematics="compiled"
+    )
+    return nmm.Loop(controller, PERIOD)
+
+
 def twice() -> dict[str, Any]:
     seen: list[Measured] = []
 
@@ -215,7 +237,13 @@ FAULTS: dict[str, tuple[Callable[[], dict[str, Any]], str, list[str], str | None
     "an encoder drifts by 3 rad/s": (
         lambda: from_then(lambda t, q: (q + 3.0 * (t - BEGINS) * np.eye(5)[3], t)),
         "stopped",
-        ["outside_limits", "stopped"],
+        ["not_following", "stopped"],
+        None,
+    ),
+    "positions 300 ms old, with new times": (
+        lambda: {"loop": to_its_limit(), "measure": old(0.3)},
+        "stopped",
+        ["not_following", "stopped"],
         None,
     ),
     "an encoder in degrees": (

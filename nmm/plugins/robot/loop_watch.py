@@ -10,7 +10,7 @@ from nmm.control.controller import Controller
 from nmm.control.goal import norms, unit_codes
 from nmm.plugins.robot.far_limits import FarLimits
 from nmm.plugins.robot.loop_log import LoopFindings
-from nmm.plugins.robot.measured_state import Jump, Refused
+from nmm.plugins.robot.measured_state import Jump, MeasuredState, Refused
 
 #: Of its rate the task gets less than that share for so long, s: distances block the robot.
 BLOCKED, BLOCKED_FOR = 0.1, 0.5
@@ -51,6 +51,15 @@ class LoopWatch:
         for values in beyond:
             self._found.add("outside_limits", t, **values)
         return bool(beyond)
+
+    def contradicts(self, t: float, measured: MeasuredState) -> bool:
+        """Whether the robot is not measured to move as its inputs ask it to."""
+        one = measured.contradiction
+        if one is not None:
+            robot = self._controller.robot
+            name, unit = robot.q_names[one.coordinate], robot.q_units[one.coordinate]
+            self._found.add("not_following", t, name=name, unit=unit, apart=one.apart, way=one.way)
+        return one is not None
 
     def look_for_blocking(self, t: float, running: bool) -> None:
         """Whether distances have blocked the robot for long, which runs, or has yet to."""

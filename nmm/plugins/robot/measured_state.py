@@ -13,6 +13,7 @@ from nmm.base.arrays import Array
 from nmm.control.goal import METRES, unit_codes
 from nmm.model.robots.robot import Robot
 from nmm.plugins.robot.held_history import HeldHistory
+from nmm.plugins.robot.motion_monitor import Contradiction, MotionMonitor
 
 
 class Refused(StrEnum):
@@ -29,13 +30,14 @@ class Refused(StrEnum):
 
 
 class Tolerances(NamedTuple):
-    """watchdog, lag : s; metres, radians : by how much a measurement may be off; confirm : see `Loop`."""
+    """watchdog, lag : s; metres, radians : by how much a measurement may be off; others as of `Loop`."""
 
     watchdog: float
     lag: float
     metres: float
     radians: float
     confirm: int | None
+    slip: tuple[float, float] | None
 
 
 class Jump(NamedTuple):
@@ -47,7 +49,8 @@ class Jump(NamedTuple):
 
 class MeasuredState:
     """Where the robot is, `q` (n,) at the time of the last call; `at` is the time of the last measurement
-    that was used, s, -inf before the first one. `history` has to be given the inputs."""
+    that was used, s, -inf before the first one. `history` has to be given the inputs. `contradiction` is that
+    of the last measurement with what the inputs asked for, None where there is none."""
 
     def __init__(self, robot: Robot, tolerances: Tolerances, period: float) -> None:
         self._robot, self._tolerances, self._period = robot, tolerances, period
@@ -57,6 +60,11 @@ class MeasuredState:
         self._off = np.where(lengths, tolerances.metres, tolerances.radians)
         self._platform = robot.platform.n_p
         self._full = 2.0 * math.pi * robot.endless
+        planar = np.arange(robot.n) < self._platform
+        of_platform, of_joints = tolerances.slip or (0.0, 0.0)
+        off = np.where(planar, 2.0, 1.0) * self._off  # a localisation is set right now and then
+        self._monitor = MotionMonitor(np.where(planar, of_platform, of_joints), off, period)
+        self.contradiction: Contradiction | None = None
         self.q = robot.rest
         self.forget()
 
@@ -67,12 +75,14 @@ class MeasuredState:
         self._candidate: Array | None = None
         self._seen: Array | None = None
         self._candidate_at, self._agreed = 0.0, 0
+        self._monitor.begin()
         self._still = np.zeros(self._robot.n)
         self._frame: Array | None = None
 
     def expect_jump(self) -> None:
         """The next measurement that is in time is used wherever it is."""
         self._used = None
+        self._monitor.begin()
 
     def move_frame(self, frame: Array) -> Jump | None:
         """Measurements go on without jumps in a frame that is at the pose `frame` (3,) now, m and rad: where
@@ -105,12 +115,18 @@ class MeasuredState:
         earlier, self._stamp = self._stamp, at
         if self._stands_still(read, earlier, at):
             return Refused.FROZEN, None
-        jump = None
-        if self._used is not None and self._beyond(self._used, self.at, read, at).any():
-            if not self._agrees(read, at):
-                return Refused.JUMP, None
-            gone = read - self.history.moved(self._used, self.at, at)
-            jump = Jump(float(np.hypot(*gone[:2])), float(abs(gone[2])))
+        jump, self.contradiction = None, None
+        if self._used is not None:
+            apart = read - self.history.moved(self._used, self.at, at)
+            lagging = self.history.way(at - self._tolerances.lag, at)
+            if self._is_beyond(apart, self.at, at).any():
+                if not self._agrees(read, at):
+                    return Refused.JUMP, None
+                jump = Jump(float(np.hypot(*apart[:2])), float(abs(apart[2])))
+                self._monitor.begin()
+            elif self._tolerances.slip is not None:
+                way = self.history.way(self.at, at)
+                self.contradiction = self._monitor.add(at, apart, way, lagging)
         self._used, self.at, self._candidate = read, at, None
         self.q = self.history.moved(read, at, now)
         return None, jump
@@ -151,9 +167,12 @@ class MeasuredState:
     def _beyond(self, start: Array, since: float, read: Array, at: float) -> Array:
         """Which coordinates (n,) the inputs cannot have brought from where they were to where they are read:
         a robot that lags or slips is somewhere between rest and twice its way."""
-        ahead = self.history.moved(start, since, at)
+        return self._is_beyond(read - self.history.moved(start, since, at), since, at)
+
+    def _is_beyond(self, apart: Array, since: float, at: float) -> Array:
+        """The same of how far they are read from where the inputs brought them."""
         way = self.history.way(since - self._tolerances.lag, at)
-        return np.asarray(np.abs(read - ahead) > self._off + way)
+        return np.asarray(np.abs(apart) > self._off + way)
 
     def _agrees(self, read: Array, at: float) -> bool:
         """Whether so many measurements in a row have the platform, and it alone, at another place."""

@@ -24,6 +24,7 @@ from nmm.plugins.robot.pace import keep_pace
 from nmm.plugins.robot.pose_filter import PoseFilter
 
 _STOPS = LoopState.STOPPING, LoopState.STOPPED
+_MOVING = LoopState.STARTING, LoopState.RUNNING, LoopState.HOLDING
 
 
 class Loop:
@@ -46,6 +47,9 @@ class Loop:
         before; what is farther off is a jump
     confirm : so many measurements in a row that agree with each other after a jump of the platform, and the
         localisation is believed; None for never
+    slip : shares of the way that the inputs asked for in the last second by which the platform and the joints
+        may have moved less or more; beyond them, and what `jump` and `lag` allow, measurements contradict the
+        inputs, as old ones with new times do, and the loop stops. None for any
     outside : share of the range between its limits (the file's, where these are wider than the controller's)
         by which a joint may be measured beyond them; farther out it is in another unit, or not homed, and the
         loop does not start, or stops. None for any
@@ -90,6 +94,7 @@ class Loop:
         lag: float = 0.05,
         jump: tuple[float, float] = (0.05, 0.1),
         confirm: int | None = 5,
+        slip: tuple[float, float] | None = (0.5, 0.1),
         outside: float | None = 0.05,
         error: tuple[float, float] | None = None,
         keep: int = 10_000,
@@ -103,7 +108,8 @@ class Loop:
         self.hold = scalar(hold, "hold", least=0.0)
         self.soft_start = scalar(soft_start, "soft_start", least=0.0)
         off = positive(jump[0], "jump"), positive(jump[1], "jump")
-        tolerances = Tolerances(self.watchdog, scalar(lag, "lag", least=0.0), *off, confirm)
+        shares = None if slip is None else tuple(scalar(share, "slip", least=0.0) for share in slip)
+        tolerances = Tolerances(self.watchdog, scalar(lag, "lag", least=0.0), *off, confirm, shares)
         controller.dt = self.period
         controller.solver.load_stop()
         self._measured = MeasuredState(controller.robot, tolerances, self.period)
@@ -221,6 +227,8 @@ class Loop:
                 self._measured.forget()
             else:
                 self._begin_stop("outside_limits")
+        if refused is None and self.state in _MOVING and self._watch.contradicts(self.t, self._measured):
+            self._begin_stop("not_following")
         if self._measured.at == -math.inf:
             return self.u.copy()
         if self.state is LoopState.WAITING:
@@ -237,7 +245,7 @@ class Loop:
     def _answer(self) -> None:
         """Inputs for where the robot is believed to be."""
         t, q, inputs = self.t, self._measured.q, self._inputs
-        if self.state in (LoopState.STARTING, LoopState.RUNNING, LoopState.HOLDING):
+        if self.state in _MOVING:
             if raised := inputs.compute(t, q):
                 self._do_without(raised)
             else:

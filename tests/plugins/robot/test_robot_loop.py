@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from loop_faults import BEGINS, FAULTS, PERIOD, drive, make_loop, try_fault
+from loop_faults import BEGINS, FAULTS, PERIOD, drive, make_loop, old, to_its_limit, try_fault
 from wandering import beyond
 
 import nmm
@@ -122,6 +122,34 @@ def test_what_blocks_it_is_told_and_an_error_stops_it() -> None:
     size = float(loop.trajectory().error_norm[50:].max())  # after its soft start
     assert [one.code for one in run(1.0, 2.0, (0.99 * size, 9.0)).findings] == ["off_task", "stopped"]
     assert not run(1.0, 2.0, (1.01 * size, 1e-9)).findings
+
+
+@pytest.mark.parametrize("by", [0.1, 0.2, 0.5])
+def test_old_positions_with_new_times_take_no_joint_far_beyond_its_limits(by: float) -> None:
+    """What a measurement may be off by is the most; without the monitor it is the way in that time."""
+    tried = drive(to_its_limit(), 6.0, old(by))
+    assert tried.broken <= 0.1 * 0.5
+    if by > 0.1:
+        assert tried.codes[-2:] == ("not_following", "stopped")
+        (found,) = (one for one in tried.loop.findings if one.code == "not_following")
+        assert found.values["name"] == "q1"
+    trusting = to_its_limit()
+    loop = nmm.Loop(trusting.controller, PERIOD, slip=None, outside=None)
+    assert drive(loop, 6.0, old(0.5)).broken > 0.3
+
+
+def test_a_robot_that_slips_lags_and_is_seen_roughly_is_no_fault() -> None:
+    """40 % of the platform's way are lost; inputs come 50 ms late; localisation is set right each second."""
+    random, loop = np.random.default_rng(3), make_loop(nmm.Circle([1.5, 0], 0.8, rate=0.6))
+    held = HeldInputs(loop.controller.robot)
+    q, asked = loop.controller.robot.q(START), [np.zeros(loop.controller.robot.n_u)] * 5
+    drift = np.zeros(5)
+    for k in range(1500):
+        if k % 100 == 50:
+            drift[:2] = random.uniform(-0.02, 0.02, 2)
+        asked.append(loop.step(k * PERIOD, q + drift + random.normal(0.0, 0.004, 5)))
+        q = held(q, asked[-6] * [0.6, 0.6, 1.0, 1.0], PERIOD)
+    assert (loop.state, [*dict.fromkeys(one.code for one in loop.findings)]) == (nmm.LoopState.RUNNING, [])
 
 
 def test_after_a_stop_it_goes_on_when_it_is_told() -> None:
@@ -363,6 +391,11 @@ EXAMPLES: dict[str, tuple[dict[str, Any], str]] = {
     "outside_limits": (
         {"name": "q2", "value": 90.0, "unit": "rad", "lower": None, "upper": 4.0, "samples": 1, "end": 1.5},
         "q2 is measured at 90 rad, outside its limits (to 4), at t = 1.5 s: another unit, or not homed?",
+    ),
+    "not_following": (
+        {"name": "q1", "apart": 0.32, "way": 0.45, "unit": "rad", "samples": 1, "end": 1.5},
+        "in the second before t = 1.5 s q1 is measured 0.32 rad off the way of 0.45 rad that its inputs "
+        "asked for: old positions with new times, or held: stops",
     ),
     "call_late": (
         {"gap": 0.03, "samples": 1, "end": 1.5},
