@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import bz2
 import io
+import math
 import os
 import sqlite3
 import struct
 import zipfile
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from robot_logs import FIRST, STORE, bag, joints, odom, wheeled
+from robot_logs import FIRST, STORE, bag, joints, odom, tf, transform, wheeled
 from rosbags import rosbag1, rosbag2
 
 import nmm
@@ -167,3 +169,25 @@ def test_rows_that_are_computed_are_refused(tmp_path: Path, change: str) -> None
             pytest.skip(f"this sqlite cannot write it: {error}")
     with pytest.raises(InputError, match="computed"):
         nmm.read_bag(folder, robot)
+
+
+@pytest.mark.parametrize("value", [1e308, -1e20, math.inf])
+@pytest.mark.parametrize("what", ["pose", "twist", "transform", "joint"])
+@pytest.mark.filterwarnings("error:overflow", "error:invalid value")
+def test_numbers_that_no_robot_reaches_are_refused(tmp_path: Path, what: str, value: float) -> None:
+    """A joint's is left out, as those are that are no number."""
+    robot, sent = wheeled(tmp_path), list[Any]()
+    for k in range(20):
+        t = 0.1 * k
+        x = {what: value} if k == 10 else {}
+        sent.append((t, "/joint_states", joints(t, {"j1": x.get("joint", 0.1), "j2": 0.2})))
+        sent.append(
+            (t, "/odom", odom(t, (x.get("pose", 0.0), 0.0, 0.0), (x.get("twist", 0.0), 0, 0, 0, 0, 0)))
+        )
+        sent.append((t, "/tf", tf(transform(t, "odom", "base_link", (x.get("transform", 0.0), 0.0, 0.0)))))
+    if what == "joint":
+        with pytest.warns(RuntimeWarning, match="left out"):
+            assert np.abs(nmm.read_bag(bag(tmp_path, sent), robot).q).max() < 1.0
+        return
+    with pytest.raises(InputError, match=r"expected (at most 1e\+09|finite numbers)"):
+        nmm.read_bag(bag(tmp_path, sent), robot)

@@ -8,7 +8,7 @@ from typing import Any
 
 from nmm.base.errors import expect
 from nmm.model.robots.robot import Robot
-from nmm.plugins.robot.ros.reading import name_of, nanoseconds
+from nmm.plugins.robot.ros.reading import expect_reached, is_reached, name_of, nanoseconds
 
 
 def timed_joints(robot: Robot) -> set[str]:
@@ -103,12 +103,11 @@ class JointStates:
         """
         positions, _ = parts(message, self._known, self._prefix)
         for name, value in positions.items():
-            needed = name in self._timed
-            if needed and not math.isfinite(value):
-                expect(False, f"{name_of(message)}: position of {name}", "a finite number", value)
+            if name in self._timed:
+                expect_reached(value, f"{name_of(message)}: position of {name}")
         at = nanoseconds(message) / 1e9
         at = t if t is not None and at == 0.0 else at
-        finite = {name: value for name, value in positions.items() if math.isfinite(value)}
+        finite = {name: value for name, value in positions.items() if is_reached(value)}
         for name in positions.keys() - finite.keys():  # an old one would stand for it
             self.joints.pop(name, None)
         self.joints.update(finite)

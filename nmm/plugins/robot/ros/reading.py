@@ -17,6 +17,8 @@ from nmm.model.robots.robot import Robot
 TILT = 0.2
 #: How far from 1 the length of a quaternion may be that was rounded on its way.
 UNIT = 1e-3
+#: No coordinate, m or rad, and no rate of a robot is larger; far beyond, squares and differences overflow.
+FARTHEST = 1e9
 
 
 def stamp(message: Any) -> float:
@@ -105,7 +107,12 @@ def placement(message: Any) -> Array:
     pose[:3, 1] = 2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)
     pose[:3, 2] = 2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)
     pose[:3, 3] = vector([at.x, at.y, at.z], 3, f"{where}: position")
+    _expect_reached(pose[:3, 3], f"{where}: position", "m")
     return pose
+
+
+def _expect_reached(values: Array, where: str, unit: str) -> None:
+    expect(not np.any(np.abs(values) > FARTHEST), where, f"at most {FARTHEST:g} {unit}", values)
 
 
 def base(message: Any, frame: str | None = None, child: str | None = None) -> Array:
@@ -203,7 +210,9 @@ def velocities(message: Any) -> tuple[Array, Array]:
     linear, angular = getattr(part, "linear", None), getattr(part, "angular", None)
     if linear is None or angular is None:
         raise InputError(where=name_of(message), expected="a message with a twist")
-    return np.array([linear.x, linear.y, linear.z]), np.array([angular.x, angular.y, angular.z])
+    rates = np.array([linear.x, linear.y, linear.z, angular.x, angular.y, angular.z])
+    _expect_reached(rates, f"{name_of(message)}: twist", "m/s and rad/s")
+    return rates[:3], rates[3:]
 
 
 def inputs(robot: Robot, q: ArrayLike, velocity: ArrayLike, joint_rates: Mapping[str, float]) -> Array:
@@ -274,7 +283,7 @@ def _by_name(message: Any, part: str) -> dict[str, float]:
         len(values) == len(names), f"{where}: {part}", f"{len(names)} numbers, as many as names", len(values)
     )
     for name, value in zip(names, values, strict=True):
-        expect(math.isfinite(value), f"{where}: {part} of {name}", "a finite number", float(value))
+        expect_reached(value, f"{where}: {part} of {name}")
     return {str(name): float(value) for name, value in zip(names, values, strict=True)}
 
 
@@ -283,6 +292,17 @@ def _field(message: Any, name: str) -> Sequence[Any]:
         raise InputError(where=name_of(message), expected=f"a message with the field {name}")
     values: Sequence[Any] = getattr(message, name)
     return values
+
+
+def is_reached(value: float) -> bool:
+    """Whether a coordinate or a rate may be a robot's."""
+    return abs(value) <= FARTHEST
+
+
+def expect_reached(value: float, where: str) -> None:
+    """`InputError` for what cannot be a robot's coordinate or rate."""
+    expected = f"a number up to {FARTHEST:g}" if math.isfinite(value) else "a finite number"
+    expect(is_reached(value), where, expected, float(value))
 
 
 def name_of(message: Any) -> str:

@@ -135,7 +135,7 @@ class Recorded:
         stamp = reading.nanoseconds(message)
         for some, tracks in ((positions, self.positions), (velocities, self.velocities)):
             for name, value in some.items():
-                if math.isfinite(value):
+                if reading.is_reached(value):
                     tracks.setdefault(name, Track()).add(stamp, recorded, np.array([value]))
                 elif tracks is self.positions and name in self._needed:
                     self._not_finite[name] = self._not_finite.get(name, 0) + 1
