@@ -12,10 +12,12 @@ import pytest
 from figure_examples import check_legible, run
 from matplotlib.figure import Figure
 
+import nmm
 from nmm import figures
 from nmm.base.bundled import bundled_scenarios
 from nmm.base.errors import InputError
 from nmm.base.figure_options import WIDTHS, FigureOptions
+from nmm.cli.exit_status import status_of
 from nmm.scenario import Scenario
 from nmm.views.figures.composed import write_run_figures
 from nmm.views.figures.motion import MotionScene
@@ -213,3 +215,32 @@ def test_the_side_view_shows_the_plane_of_the_motion() -> None:
     circle = np.column_stack([np.cos(3.0 * s), np.sin(3.0 * s), s])
     for other in (circle, path[:1], path[:, [2, 2, 2]] * [0.0, 0.0, 1.0], np.full((4, 3), np.nan)):
         assert upright(other) == SIDE
+
+
+#: Names that matplotlib would read as formulas, and cannot.
+DOLLARS = """<robot name="a$b^$"><link name="base"/><link name="upper"/><link name="tip$x^$"/>
+<joint name="q$1^{$" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0.1 0 0.3"/>
+<axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+<joint name="q$\\frac$2" type="revolute"><parent link="upper"/><child link="tip$x^$"/><origin xyz="0.3 0 0"/>
+<axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint></robot>"""
+
+
+def test_names_with_dollar_signs_stand_as_they_are(tmp_path: Path) -> None:
+    file = tmp_path / "r.urdf"
+    file.write_text(DOLLARS, encoding="utf-8")
+    robot = nmm.load(file, platform="unicycle", wheels=[])
+    task = nmm.Task(nmm.Position("tip$x^$", "xy"), [1.0, 0.5])
+    controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=nmm.Limits())
+    run = nmm.simulate(controller, robot.rest, 0.1, 0.01)
+    written = run.save(tmp_path / "run", figures=FigureOptions(("svg",)))
+    texts = "".join(figure.read_text(encoding="utf-8") for figure in written.glob("*.svg"))
+    for name in ("q$1^{$", "q$\\frac$2", "tip$x^$"):
+        assert name in texts
+    drawn = ["map", str(file), "--platform", "unicycle", "--wheels", "none", "--task", "position:tip$x^$:xy"]
+    drawn += ["--over", "q$1^{$,theta", "--out", str(tmp_path / "map"), "--format", "svg"]
+    drawn += ["--at", "q$\\frac$2=0.5", "--measure", "weighted"]
+    assert status_of(drawn) == 0
+    (figure,) = (tmp_path / "map").glob("*.svg")
+    text = figure.read_text(encoding="utf-8")
+    assert "q$1^{$" in text
+    assert "q$\\frac$2 = 0.5" in text

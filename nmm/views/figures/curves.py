@@ -68,7 +68,7 @@ def draw_events(axes: Axes, trajectory: Trajectory, *, named: bool) -> None:
         if named:
             axes.annotate(
                 f"{', '.join(texts)} ", (t, 0.02), xycoords=("data", "axes fraction"), rotation=90,
-                ha="right", va="bottom", fontsize=style.SMALL, color=style.GREY,
+                ha="right", va="bottom", fontsize=style.SMALL, color=style.GREY, parse_math=False,
             )  # fmt: skip
 
 
@@ -298,7 +298,7 @@ def _draw_partition(axes: Axes, trajectory: Trajectory) -> None:
         axes.axvspan(t[first], t[last], color=color, alpha=0.25, linewidth=0)
         if t[last] - t[first] > 0.15 * (t[-1] - t[0]):
             middle, text = 0.5 * (t[first] + t[last]), names or "none: damped"
-            axes.text(middle, 0.5, text, ha="center", va="center", fontsize=style.SMALL)
+            axes.text(middle, 0.5, text, ha="center", va="center", fontsize=style.SMALL, parse_math=False)
     axes.set(ylim=(0.0, 1.0), yticks=[])
     axes.grid(False)
     style.label(axes, y="Ja")

@@ -65,7 +65,7 @@ def ellipses(
     made = page(scene, width, above=_LINE)
     made.text(
         style.LEFT / width, 1.0 - 0.5 * _LINE / float(made.get_size_inches()[1]), scene.text,
-        fontsize=style.SMALL, color=style.GREY, va="top",
+        fontsize=style.SMALL, color=style.GREY, va="top", parse_math=False,
     )  # fmt: skip
     if path is not None:
         save(made, path)

@@ -65,7 +65,7 @@ def map_figure(
         axes = style.place(made, style.LEFT + k * step, style.BOTTOM, across, height)
         image = _draw_values(axes, drawn, values, bounds)
         if name:
-            axes.set_title(name, fontsize=style.SMALL, color=resolver_style.BLACK, pad=3)
+            axes.set_title(name, fontsize=style.SMALL, color=resolver_style.BLACK, pad=3, parse_math=False)
         # The arm's singular set below, dashed; what is left of it above, solid.
         if drawn.arm_singular is not None:
             _draw_set(axes, drawn, drawn.arm_singular, "arm alone", "white")
@@ -78,7 +78,8 @@ def map_figure(
     size = made.get_size_inches()
     bar = made.colorbar(image, cax=made.add_axes((np.array(place) / np.tile(size, 2)).tolist()))
     unit = drawn.about.units[measure]
-    style.label(bar.ax, y=subscripted(MEASURES[measure].symbol) + (f" [{unit}]" if unit else ""))
+    symbol = subscripted(MEASURES[measure].symbol)
+    style.label(bar.ax, y=symbol + (f" [{unit}]" if unit else ""), typeset=True)
     style.ticks(bar.ax)
     style.value_axis(bar.ax, bins=6)
     bar.ax.spines[:].set_visible(False)
@@ -136,7 +137,7 @@ def _dress(axes: Axes, drawn: Map, *, named: bool) -> None:
     for axis, name, unit, values in zip(both, drawn.names, drawn.units, drawn.axes, strict=True):
         called = f"{drawn.frame} {name}" if drawn.kind == "workspace" else resolver_style.pretty(name)
         if axis is axes.xaxis or named:
-            axis.set_label_text(f"{called} [{unit}]", fontsize=style.TEXT, color=resolver_style.BLACK)
+            style.label(axes, **{axis.axis_name: f"{called} [{unit}]"})
         span = float(values[-1] - values[0])
         if unit == "rad" and span >= np.pi / 2:
             # The coarsest of π/2, π/4, ... with at least three ticks.
@@ -156,6 +157,11 @@ def subscripted(symbol: str) -> str:
     return re.sub(r"(\w)_(\w+)", r"$\\mathregular{\1_{\2}}$", symbol)
 
 
+def _literal(text: str) -> str:
+    """Text whose dollar signs begin no formula."""
+    return text.replace("$", r"\$")
+
+
 def _title(drawn: Map, measure: str, width: float) -> list[tuple[str, bool]]:
     """Lines of the title, and whether each is the headline."""
     about = drawn.about
@@ -166,9 +172,11 @@ def _title(drawn: Map, measure: str, width: float) -> list[tuple[str, bool]]:
     if about.sizes:
         notes.append(about.sizes)
     if about.weights:
-        notes.append("weights " + ", ".join(f"{name} {value:g}" for name, value in about.weights.items()))
+        weights = ", ".join(f"{name} {value:g}" for name, value in about.weights.items())
+        notes.append(_literal(f"weights {weights}"))
     across = int((width - 0.4) / 0.062)
-    texts = [line for text in ("; ".join(notes), _held(drawn)) for line in textwrap.wrap(text, across)]
+    parts = "; ".join(notes), _literal(_held(drawn))
+    texts = [line for text in parts for line in textwrap.wrap(text, across)]
     return [(f"{about.robot}: {', '.join(about.task)}", True), *((line, False) for line in texts)]
 
 
@@ -233,7 +241,7 @@ def _write_title(made: Figure, lines: list[tuple[str, bool]]) -> None:
     plain: dict[str, Any] = {"fontsize": style.SMALL, "fontweight": "normal", "color": style.GREY}
     for k, (text, headline) in enumerate(lines):
         y = 1.0 - (0.1 + LINE * k) / height
-        made.text(0.2 / width, y, text, va="top", **(head if headline else plain))
+        made.text(0.2 / width, y, text, va="top", **(head if headline else plain), parse_math=not headline)
 
 
 def _draw_set(axes: Axes, drawn: Map, singular: SingularSet, name: str, color: str) -> None:

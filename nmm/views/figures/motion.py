@@ -158,7 +158,9 @@ class MotionScene(Viewed):
         for k, (place, text) in enumerate(zip(self.times_at(view, width), self._times(), strict=False)):
             color = style.GREY if k < len(self.times) else OBSTACLE_TEXT
             x, y = place.middle.tolist()
-            axes.text(x, y, text, color=color, fontsize=SIZE, ha="center", va="center", zorder=7)
+            axes.text(
+                x, y, text, color=color, fontsize=SIZE, ha="center", va="center", zorder=7, parse_math=False
+            )
             if place.foot is not None:
                 axes.plot(*np.array([place.foot, place.end]).T, color=color, linewidth=0.5, zorder=6.5)
 

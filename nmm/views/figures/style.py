@@ -125,11 +125,12 @@ def legend_rows(names: Sequence[str], width: float) -> int:
     return -(-len(names) // legend_columns(names, width)) if names else 1
 
 
-def label(axes: Axes, *, x: str = "", y: str = "") -> None:
+def label(axes: Axes, *, x: str = "", y: str = "", typeset: bool = False) -> None:
+    """What the axes are; the text as it stands, or `typeset`, with formulas between dollar signs."""
     if x:
-        axes.set_xlabel(x, fontsize=TEXT, color=BLACK, labelpad=3)
+        axes.set_xlabel(x, fontsize=TEXT, color=BLACK, labelpad=3, parse_math=typeset)
     if y:
-        axes.set_ylabel(y, fontsize=TEXT, color=BLACK, labelpad=4)
+        axes.set_ylabel(y, fontsize=TEXT, color=BLACK, labelpad=4, parse_math=typeset)
 
 
 def aligned(made: Figure) -> Figure:
@@ -218,11 +219,13 @@ def legend(axes: Axes, width: float | None = None, *, lift: float = 0.0, only: s
         return
     across, height = inches(axes)
     width = across if width is None else width
-    axes.legend(
+    made = axes.legend(
         handles, names, loc="lower left", bbox_to_anchor=(0.0, 1.0 + lift / height), frameon=False,
         ncols=legend_columns(names, width), fontsize=SMALL, labelcolor=BLACK, borderaxespad=0.25,
         borderpad=0.0, handlelength=1.9, handletextpad=0.5, columnspacing=1.4, labelspacing=0.25,
     )  # fmt: skip
+    for text in made.get_texts():
+        text.set_parse_math(False)  # a name may have dollar signs
 
 
 def units(names: Iterable[str]) -> str:
@@ -296,7 +299,8 @@ def mark_targets(axes: Axes, points: Array) -> None:
 
 def note(axes: Axes, text: str) -> None:
     axes.yaxis.set_major_locator(NullLocator())
-    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", fontsize=TEXT, color=GREY)
+    place: dict[str, Any] = {"transform": axes.transAxes, "ha": "center", "va": "center"}
+    axes.text(0.5, 0.5, text, **place, fontsize=TEXT, color=GREY, parse_math=False)
 
 
 #: What Matplotlib reads of its global state while it writes: whole fonts (Type 3 is refused by publishers),
