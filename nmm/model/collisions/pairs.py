@@ -26,6 +26,8 @@ THIN = 5e-4
 _CORNERS = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, -1).T
 #: How many configurations are drawn to see which pairs always touch, and how often links do.
 SAMPLES, CONFIGURATIONS = 200, 1000
+#: Of more pairs those are left out whose shapes are far apart; whether two just touch depends on the last q.
+FEW_PAIRS = 2_000
 #: In so many of these boxes are looked at first.
 FIRST = 8
 #: Coordinates without limits are drawn from ± this, m or rad.
@@ -268,6 +270,26 @@ class Touching:
         return {pair: share for pair, share in self.shares.items() if 0.0 < share < 1.0}
 
 
+class NearPairs:
+    """Of pairs of shapes (P, 2) those whose balls touch: of 18,000 pairs of a long chain some hundred."""
+
+    def __init__(self, shapes: pin.GeometryModel, pairs: Integers) -> None:
+        bodies = [shape.geometry for shape in shapes.geometryObjects]
+        for body in bodies:
+            body.computeLocalAABB()
+        self._middles = np.array([body.aabb_center for body in bodies])
+        radii = np.array([body.aabb_radius for body in bodies])
+        self._first, self._second = pairs.T
+        self._reach = radii[self._first] + radii[self._second]
+
+    def at(self, data: pin.GeometryData) -> list[int]:
+        """Their numbers where the shapes are now."""
+        middles = np.array([place.act(middle) for place, middle in zip(data.oMg, self._middles, strict=True)])
+        apart = np.linalg.norm(middles[self._first] - middles[self._second], axis=1)
+        # What is infinite has no middle, and is near everything.
+        return np.flatnonzero(~(apart > self._reach)).tolist()
+
+
 def touching_links(robot: Robot, count: int = CONFIGURATIONS) -> Touching:
     """How often the links of the model's collision pairs touch, meshes as convex hulls.
 
@@ -289,11 +311,14 @@ def touching_links(robot: Robot, count: int = CONFIGURATIONS) -> Touching:
     geometry_data, data = pin.GeometryData(shapes), robot.model.createData()
     named = [(links[i], links[j]) for i, j in pairs]
     distinct = list(dict.fromkeys(named))
-    column = np.array([distinct.index(pair) for pair in named])
+    columns = {pair: k for k, pair in enumerate(distinct)}
+    column = np.array([columns[pair] for pair in named])
     touched = np.zeros(len(distinct))
+    near = NearPairs(shapes, np.array(pairs)) if len(pairs) > FEW_PAIRS else None
     for q in random_configurations(robot, count):
-        pin.computeCollisions(robot.model, data, shapes, geometry_data, q, False)
-        hit = [result.isCollision() for result in geometry_data.collisionResults]
+        pin.updateGeometryPlacements(robot.model, data, shapes, geometry_data, q)
+        some = range(len(pairs)) if near is None else near.at(geometry_data)
+        hit = [k for k in some if pin.computeCollision(shapes, geometry_data, k)]
         touched[np.unique(column[hit])] += 1.0
     order = np.argsort(-touched, kind="stable")
     return Touching(len(links), count, {distinct[k]: float(touched[k]) / count for k in order})
