@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import IO
 
 from nmm.base.errors import InputError, NmmError, RunError, expect
+from nmm.base.text_format import one_line, printable
 
 try:
     import fcntl
@@ -33,14 +34,28 @@ def read_bytes(path: Path, most: int) -> bytes:
 
 
 def expect_file(path: Path) -> None:
-    """`OSError` for what is not there, a device and a pipe."""
-    mode = path.stat().st_mode
+    """`OSError` for what is not there, a device and a pipe, and for a name that no file can have."""
+    try:
+        mode = path.stat().st_mode
+    except ValueError as error:  # a null character, half a character
+        raise OSError(errno.EINVAL, f"no name of a file: {error}") from None
     if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
         raise OSError(errno.EINVAL, "expected a file, this is a device or a pipe")
 
 
+def expect_name(path: str | Path) -> None:
+    """`InputError` for what no file and no folder can be called."""
+    try:
+        os.lstat(path)
+    except ValueError as error:  # a null character, half a character
+        raise InputError(f"is no name of a file: {error}", where=printable(str(path))) from None
+    except OSError as error:
+        expect(error.errno != errno.ENAMETOOLONG, one_line(str(path), 100), "a shorter name", error.strerror)
+
+
 def replaceable(path: Path) -> Path:
     """The file to replace, symbolic links followed; `InputError` where something there is no file."""
+    expect_name(path)
     target = Path(os.path.realpath(path))
     expect(not target.is_dir(), path, "a file, this is a folder")
     expect(not target.is_symlink(), path, "a file, this is a symbolic link that leads to itself")

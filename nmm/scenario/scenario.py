@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 from pydantic import ValidationError
 
-from nmm.base.errors import ScenarioError, no_such
+from nmm.base.errors import InputError, ScenarioError, no_such
+from nmm.base.files import expect_name
 from nmm.base.findings import Finding
 from nmm.base.progress import Progress
 from nmm.base.trust import is_trusted, trusting
@@ -296,6 +297,10 @@ def _find(name_or_path: str | Path) -> Path:
     bundled = bundled_scenarios()
     if isinstance(name_or_path, str) and name_or_path in bundled:
         return bundled[name_or_path]
+    try:
+        expect_name(path)
+    except InputError as error:
+        raise ScenarioError(str(error)) from None
     if path.is_file() or path.suffix in SUFFIXES or len(path.parts) > 1:
         return path
     raise no_such("scenario", str(name_or_path), bundled, error=ScenarioError)

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -233,3 +233,28 @@ def test_a_killed_command_leaves_what_was_whole(tmp_path: Path, name: str) -> No
     assert [path.name for path in tmp_path.iterdir()] == ["o"]
     hidden = {path for path, _ in files_in(tmp_path / "o") if "/." in f"/{path}"}
     assert hidden <= {".lock"}
+
+
+@pytest.mark.parametrize("name", ["a\0b", "a\ud800b", "a" * 300], ids=["null", "half a character", "long"])
+def test_what_no_file_can_be_called_is_refused(tmp_path: Path, name: str) -> None:
+    """From Python, or from a file that names it: no command line can hold a null character."""
+    path = str(tmp_path / name)
+    scenario = nmm.Scenario.load("unicycle_2r_position", {"duration": 0.02})
+    run, robot = scenario.run(), scenario.robot()
+    calls: list[Callable[[], object]] = [
+        lambda: nmm.load(path + ".urdf"),
+        lambda: nmm.load("unicycle_2r", srdf=path),
+        lambda: nmm.Scenario.load(path + ".yaml"),
+        lambda: nmm.Trajectory.load(path),
+        lambda: nmm.PointCloud.load(path + ".ply"),
+        lambda: nmm.OccupancyMap.load(path + ".yaml"),
+        lambda: nmm.ElevationMap.load(path + ".npz"),
+        lambda: nmm.read_bag(path, robot),
+        lambda: run.save(path, figures=False),
+        lambda: run.save_mcap(path + ".mcap"),
+        lambda: nmm.Sweep("unicycle_2r_position", {"q0.x": [0, 1]}, settings={"duration": 0.02}).run(path),
+    ]
+    for call in calls:
+        with pytest.raises(nmm.NmmError) as caught:
+            call()
+        assert str(caught.value).isprintable()

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from nmm.base.errors import InputError
-from nmm.base.files import OLD, PATIENCE, at_work, busy, read_bytes, writing, written_at
+from nmm.base.files import OLD, PATIENCE, at_work, busy, expect_name, read_bytes, writing, written_at
 from nmm.base.machine import made_with
 
 Read = TypeVar("Read")
@@ -63,8 +63,8 @@ def replaced_folder(
     import shutil  # here, both: `nmm --help` would pay
     import tempfile
 
-    final = Path(os.path.realpath(folder))
     check_replaceable(folder, is_ours)
+    final = Path(os.path.realpath(folder))
     with written_at(folder):
         final.parent.mkdir(parents=True, exist_ok=True)
         with writing(final, patience) as hidden:
@@ -116,6 +116,7 @@ def exchanged(one: Path, other: Path) -> bool:
 
 def steady(folder: Path, read: Callable[[], Read]) -> Read:
     """What `read` finds in a folder that may be replaced meanwhile: all old or all new."""
+    expect_name(folder)
     for _ in range(MOST_READINGS):
         before = _identity(folder)
         try:
@@ -131,6 +132,7 @@ def steady(folder: Path, read: Callable[[], Read]) -> Read:
 
 def check_replaceable(folder: str | Path, is_ours: Callable[[Path], bool]) -> None:
     """InputError if `folder` is neither new, empty nor ours."""
+    expect_name(folder)
     final = Path(folder)
     with written_at(folder):
         if final.is_dir() and (not any(final.iterdir()) or is_ours(final)):
