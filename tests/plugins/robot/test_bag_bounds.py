@@ -138,6 +138,17 @@ def test_what_is_decompressed_in_all_is_bounded(
     assert len(str(error.value)) <= 300
 
 
+def test_messages_are_bounded_by_the_files_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A few bytes, compressed, may say the same message for hours."""
+    folder, robot = logged(tmp_path), wheeled(tmp_path)
+    monkeypatch.setattr(chunks, "MESSAGES_A_BYTE", 0)
+    monkeypatch.setattr(chunks, "FEW_MESSAGES", 40)
+    assert len(nmm.read_bag(folder, robot))
+    monkeypatch.setattr(chunks, "FEW_MESSAGES", 39)
+    with pytest.raises(InputError, match="a message a byte"):
+        nmm.read_bag(folder, robot)
+
+
 def test_a_file_is_decompressed_as_far_as_the_disk_has_room(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -90,7 +90,7 @@ def read_bag(
     times, q, u = motion.times, motion.q, motion.u
     t = (times - times[0]) / 1e9
     count = len(t)
-    q_dot = np.array([robot.S(at) @ now for at, now in zip(q, u, strict=True)])
+    q_dot = np.einsum("kij,kj->ki", velocity_maps(robot, q), u)
     place = None
     if frame is not None:
         place = np.array([Configuration(robot, at).placement(frame).translation for at in q])
@@ -224,9 +224,9 @@ class _RecordedMotion:
             Finding("rates_contradict", {"names": names, "zero": zero})
             for zero, names in contradicted.items()
         ]
-        return np.array([
-            np.linalg.lstsq(robot.S(at), rate, rcond=None)[0] for at, rate in zip(self.q, q_dot, strict=True)
-        ])  # fmt: skip
+        maps = velocity_maps(robot, self.q)
+        least = np.linalg.pinv(maps, rcond=np.finfo(float).eps * max(maps.shape[1:]))
+        return np.einsum("kij,kj->ki", least, q_dot)
 
     def _platform_rates(self, route: Route, t: Array, contradicted: dict[bool, list[str]]) -> Array:
         """Rates (N, 3) of x, y, theta: of the twists, or by differences of what counts the motion, which no
@@ -256,6 +256,15 @@ class _RecordedMotion:
             for part in parts
             for some in ([0, 1], [2])
         )
+
+
+def velocity_maps(robot: Robot, q: Array) -> Array:
+    """S (N, n, n_u) at N samples q (N, n): of the arm the same at all."""
+    n_p, p, following = robot.platform.n_p, robot.platform.p, robot.following
+    maps = np.tile(robot.S(q[0]), (len(q), 1, 1))
+    maps[:, :n_p, :p] = robot.platform.velocity_maps(q[:, :n_p])[0]
+    maps[:, following.columns] = following.multipliers[:, np.newaxis] * maps[:, following.leaders]
+    return maps
 
 
 def along(rates: Array, angle: Array) -> Array:

@@ -27,6 +27,8 @@ from nmm.plugins.robot.ros.log import rosbags
 MOST_OF_A_CHUNK, MOST_OF_ALL, MOST_TIMES = 1_000_000_000, 20_000_000_000, 200
 #: Bytes of a metadata.yaml.
 MOST_OF_METADATA = 10_000_000
+#: Messages of a log: so many, or so many a byte of its files. Each takes a tenth of a millisecond to read.
+FEW_MESSAGES, MESSAGES_A_BYTE = 2_000_000, 1
 #: Of the disk's free space so much may be filled by files that are decompressed.
 SHARE_OF_DISK = 0.5
 
@@ -34,11 +36,12 @@ T = TypeVar("T")
 
 
 class Allowance:
-    """The bytes that one pass over a log may make of compressed ones; `InputError` for more."""
+    """The messages of one pass over a log, and the bytes made of compressed ones; `InputError` for more."""
 
     def __init__(self, path: Path) -> None:
         self._path, self._made = path, 0
         self._most = most_of(path)
+        self._messages = max(FEW_MESSAGES, MESSAGES_A_BYTE * _size_of(path))
 
     @contextmanager
     def counting(self) -> Iterator[None]:
@@ -52,10 +55,16 @@ class Allowance:
     def over(self, items: Iterator[T]) -> Iterator[T]:
         """The items, counting what is decompressed for each."""
         while True:
-            with self.counting():
+            before = _ALLOWED.set(self)  # as `counting` does, in a twentieth of a message's time
+            try:
                 item = next(items, None)
+            finally:
+                _ALLOWED.reset(before)
             if item is None:
                 return
+            self._messages -= 1
+            if self._messages < 0:
+                raise InputError(where=self._path, expected="a message a byte of its files", got="more")
             yield item
 
     def take(self, size: int, most: float = float("inf")) -> None:
@@ -71,8 +80,12 @@ _ALLOWED: ContextVar[Allowance | None] = ContextVar("allowance", default=None)
 
 def most_of(path: Path) -> float:
     """How many bytes of messages a log may hold, by those of its files."""
+    return max(MOST_OF_ALL, MOST_TIMES * _size_of(path))
+
+
+def _size_of(path: Path) -> int:
     files = [file for file in path.iterdir() if file.is_file()] if path.is_dir() else [path]
-    return max(MOST_OF_ALL, MOST_TIMES * sum(file.stat().st_size for file in files))
+    return sum(file.stat().st_size for file in files)
 
 
 def claims_of(bag: Any) -> Iterator[tuple[Path, list[int]]]:

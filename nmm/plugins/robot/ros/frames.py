@@ -233,8 +233,9 @@ def carried(linear: Array, angular: Array, pose: Array) -> Array:
     and the angular velocity (3,) of their origin are. On level axes only what is level counts."""
     if pose[2, 2] > 1.0 - 1e-9:
         linear, angular = np.array([*linear[:2], 0.0]), np.array([0.0, 0.0, angular[2]])
-    turn = pose[:3, :3].T
-    return np.array([*(turn @ (linear + np.cross(angular, pose[:3, 3])))[:2], (turn @ angular)[2]])
+    turn, (x, y, z), (a, b, c) = pose[:3, :3].T, pose[:3, 3].tolist(), angular.tolist()
+    across = np.array([b * z - c * y, c * x - a * z, a * y - b * x])  # np.cross takes ten times as long
+    return np.array([*(turn @ (linear + across))[:2], (turn @ angular)[2]])
 
 
 def odometry(

@@ -98,21 +98,30 @@ def placement(message: Any) -> Array:
     turn = getattr(part, "orientation", None) or getattr(part, "rotation", None)
     if at is None or turn is None:
         raise InputError(where=where, expected="a message with a pose or a transform")
-    x, y, z, w = vector([turn.x, turn.y, turn.z, turn.w], 4, f"{where}: orientation")
+    # One number at a time: arrays of three or four take ten times as long, and logs have 10^5 poses.
+    x, y, z, w = _numbers((turn.x, turn.y, turn.z, turn.w), where, "orientation")
     length = math.hypot(x, y, z, w)
     expect(abs(length - 1.0) <= UNIT, f"{where}: orientation", "a quaternion of length 1", length)
     x, y, z, w = x / length, y / length, z / length, w / length
-    pose = np.eye(4)
-    pose[:3, 0] = 1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)
-    pose[:3, 1] = 2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)
-    pose[:3, 2] = 2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)
-    pose[:3, 3] = vector([at.x, at.y, at.z], 3, f"{where}: position")
-    _expect_reached(pose[:3, 3], f"{where}: position", "m")
-    return pose
+    place = _numbers((at.x, at.y, at.z), where, "position")
+    _expect_reached(place, f"{where}: position", "m")
+    return np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), place[0]],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), place[1]],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), place[2]],
+        [0.0, 0.0, 0.0, 1.0],
+    ])  # fmt: skip
 
 
-def _expect_reached(values: Array, where: str, unit: str) -> None:
-    expect(not np.any(np.abs(values) > FARTHEST), where, f"at most {FARTHEST:g} {unit}", values)
+def _numbers(values: tuple[float, ...], where: str, part: str) -> Sequence[float]:
+    if all(type(value) is float and math.isfinite(value) for value in values):
+        return values
+    return list(vector(list(values), len(values), f"{where}: {part}").tolist())
+
+
+def _expect_reached(values: Sequence[float], where: str, unit: str) -> None:
+    if any(abs(value) > FARTHEST for value in values):
+        raise InputError(where=where, expected=f"at most {FARTHEST:g} {unit}", got=list(values))
 
 
 def base(message: Any, frame: str | None = None, child: str | None = None) -> Array:
@@ -210,9 +219,10 @@ def velocities(message: Any) -> tuple[Array, Array]:
     linear, angular = getattr(part, "linear", None), getattr(part, "angular", None)
     if linear is None or angular is None:
         raise InputError(where=name_of(message), expected="a message with a twist")
-    rates = np.array([linear.x, linear.y, linear.z, angular.x, angular.y, angular.z])
+    rates = linear.x, linear.y, linear.z, angular.x, angular.y, angular.z
     _expect_reached(rates, f"{name_of(message)}: twist", "m/s and rad/s")
-    return rates[:3], rates[3:]
+    both = np.array(rates)
+    return both[:3], both[3:]
 
 
 def inputs(robot: Robot, q: ArrayLike, velocity: ArrayLike, joint_rates: Mapping[str, float]) -> Array:
