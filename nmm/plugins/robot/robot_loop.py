@@ -108,7 +108,9 @@ class Loop:
         self.hold = scalar(hold, "hold", least=0.0)
         self.soft_start = scalar(soft_start, "soft_start", least=0.0)
         off = positive(jump[0], "jump"), positive(jump[1], "jump")
-        shares = None if slip is None else tuple(scalar(share, "slip", least=0.0) for share in slip)
+        shares = (
+            None if slip is None else (scalar(slip[0], "slip", least=0.0), scalar(slip[1], "slip", least=0.0))
+        )
         tolerances = Tolerances(self.watchdog, scalar(lag, "lag", least=0.0), *off, confirm, shares)
         controller.dt = self.period
         controller.solver.load_stop()

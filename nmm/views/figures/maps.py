@@ -137,7 +137,8 @@ def _dress(axes: Axes, drawn: Map, *, named: bool) -> None:
     for axis, name, unit, values in zip(both, drawn.names, drawn.units, drawn.axes, strict=True):
         called = f"{drawn.frame} {name}" if drawn.kind == "workspace" else resolver_style.pretty(name)
         if axis is axes.xaxis or named:
-            style.label(axes, **{axis.axis_name: f"{called} [{unit}]"})
+            text = f"{called} [{unit}]"
+            style.label(axes, x=text) if axis is axes.xaxis else style.label(axes, y=text)
         span = float(values[-1] - values[0])
         if unit == "rad" and span >= np.pi / 2:
             # The coarsest of π/2, π/4, ... with at least three ticks.
