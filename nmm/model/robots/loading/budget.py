@@ -30,7 +30,7 @@ _ITEMS = str | list | tuple | dict | set | frozenset
 _WIDE = re.compile(r"%(?:\([^)]*\))?[-+ #0]*(?:\*|\d{4}|\d*\.(?:\*|\d{4}))")
 
 
-class Refused(Exception):
+class RefusedContent(Exception):
     """What a file may not ask for; `text` is where it does, as it stands in the file."""
 
     def __init__(self, finding: Finding, text: str = "") -> None:
@@ -38,7 +38,7 @@ class Refused(Exception):
         super().__init__(str(finding))
 
 
-class BeyondBound(Refused):
+class BeyondBound(RefusedContent):
     """A bound, by what it counts."""
 
     def __init__(self, what: str, most: float) -> None:

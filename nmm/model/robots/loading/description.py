@@ -21,7 +21,7 @@ from nmm.base.errors import RobotError, expect_known
 from nmm.base.findings import Finding
 from nmm.base.findings.robot_file import refusal
 from nmm.base.text_format import listed, one_line
-from nmm.model.robots.loading.budget import STEPS_OF_A_FILE, Budget, Refused
+from nmm.model.robots.loading.budget import STEPS_OF_A_FILE, Budget, RefusedContent
 from nmm.model.robots.loading.mjcf import Converted, urdf_of
 from nmm.model.robots.loading.packages import Packages
 from nmm.model.robots.loading.trust import check_readable
@@ -266,7 +266,7 @@ def _reader(
         if Path(filename) != main:
             try:
                 check_readable(filename, packages)
-            except Refused:
+            except RefusedContent:
                 xacro.filestack.pop()  # as above: the error is the including file's
                 raise
         try:
@@ -325,11 +325,11 @@ def _place(text: str, path: Path, xacro: Any) -> dict[str, Any]:
 
 def _explained(error: BaseException, path: Path, xacro: Any) -> RobotError:
     """The innermost cause in one line; xacro wraps it once for each expression around it."""
-    while isinstance(getattr(error, "exc", None), xacro.XacroException | RobotError | Refused):
+    while isinstance(getattr(error, "exc", None), xacro.XacroException | RobotError | RefusedContent):
         error = error.exc  # type: ignore[attr-defined]  # XacroException has it, as just asked
     if isinstance(error, RobotError):
         return error
-    if isinstance(error, Refused):
+    if isinstance(error, RefusedContent):
         return refusal(path, replace(error.finding, where=_place(error.text, path, xacro)))
     inside = getattr(error, "exc", None)
     code, values = "xacro_failed", {"reason": one_line(str(error)) or type(error).__name__}

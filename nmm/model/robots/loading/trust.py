@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from nmm.base.findings import Finding
 from nmm.base.trust import is_trusted
-from nmm.model.robots.loading.budget import Refused
+from nmm.model.robots.loading.budget import RefusedContent
 
 if TYPE_CHECKING:
     from nmm.model.robots.loading.packages import Packages
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 _NEAR = 5
 
 
-def untrusted(what: str, text: str = "") -> Refused:
-    return Refused(Finding("xacro_untrusted", {"what": what}), text)
+def untrusted(what: str, text: str = "") -> RefusedContent:
+    return RefusedContent(Finding("xacro_untrusted", {"what": what}), text)
 
 
 def check_readable(name: str, packages: Packages, pattern: str = "") -> None:
-    """`Refused` for a file that is neither in the robot's folder or package nor in one that it asked for.
-    Where a file may be that matches a pattern, `name`, no folder is listed before."""
+    """`RefusedContent` for a file that is neither in the robot's folder or package nor in one that it asked
+    for. Where a file may be that matches a pattern, `name`, no folder is listed before."""
     if is_trusted() or not (pattern or os.path.lexists(name)) or _is_within(name, packages):
         return
     text = os.path.basename(pattern or name)
