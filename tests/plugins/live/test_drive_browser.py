@@ -502,7 +502,8 @@ WATCH = """() => {
     const now = performance.now();
     late += Math.max(0, now - beat - 20);
     beat = now;
-    if (nmm.silent && window.noticed === undefined) window.noticed = [now - last, late];
+    const dead = document.getElementById("plan").inert;
+    if (dead && window.noticed === undefined) window.noticed = [now - last, late];
   }, 20);
 }"""
 
@@ -528,6 +529,7 @@ def test_a_robot_that_does_not_answer_is_seen_and_begins_again(
             assert "bad" in str(told.get_attribute("class"))
             dead = "id => document.getElementById(id).closest('[inert]') !== null"
             assert all(page.evaluate(dead, name) for name in ("pause", "plan", "choices"))
+            page.wait_for_function("nmm.silent", timeout=1000.0 * MOST)
             before, stood = target(page), page.evaluate("nmm.drive.time")
             drag(page, place(page, 0, "", 0.0), (30.0, 10.0))
             page.keyboard.press("ArrowRight")

@@ -19,25 +19,27 @@
   const order = (what) => (!nmm.silent || what === "restart") && send({ type: "order", what });
 
   // A program that sends no picture does not hear either, for now; only to begin again may wait for it. What counts
-  // are a timer's turns without a picture: a page that is busy itself is late for both.
-  const [TICK, SILENCE] = [100, 7]; // ms, turns
+  // are a timer's turns without a picture: a page that is busy itself is late for both. What is aimed at within two
+  // seconds a slow program still hears; later it would only be a surprise.
+  const [TICK, SILENCE, DEAF] = [100, 7, 20]; // ms, turns, turns
   let [heard, turns] = [0, 0];
   function hear() {
     heard = performance.now();
+    if (turns >= SILENCE) grey(false);
     turns = 0;
-    if (nmm.silent) fall(false);
+    nmm.silent = false;
   }
   function tick() {
     turns += 1;
     if (nmm.ended || turns < SILENCE) return;
-    if (!nmm.silent) fall(true);
+    if (turns === SILENCE) grey(true);
+    nmm.silent = turns >= DEAF;
     const told = `The robot does not answer, since ${Math.round((performance.now() - heard) / 1000)} s`;
     if (parts.told.textContent !== told) parts.told.textContent = told;
     parts.told.classList.add("bad");
   }
-  function fall(silent) {
-    nmm.silent = silent;
-    for (const part of panel.querySelectorAll("#pause, #plan, fieldset, #choices")) part.inert = silent;
+  function grey(dead) {
+    for (const part of panel.querySelectorAll("#pause, #plan, fieldset, #choices")) part.inert = dead;
   }
 
   // What is aimed at goes out at once, but for what follows within a few ms: that goes with the next picture.
