@@ -364,3 +364,21 @@ def test_rows_of_a_sweep_are_trusted(tmp_path: Path, jobs: str) -> None:
     assert status_of([*command, "--out", str(tmp_path / "swept"), "--trust"]) == 0
     rows = pq.read_table(tmp_path / "swept" / "rows.parquet", partitioning=None)
     assert rows["outcome"].to_pylist() == ["completed"] * 3
+
+
+@pytest.mark.parametrize(
+    "expression",
+    [
+        "round(ndigits=-200000, number=7)",
+        "1.5 in python.range(3 * 10**7) or 2.5 in python.range(3 * 10**7)",
+        "1.5 not in python.range(9 * 10**7)",
+    ],
+)
+def test_work_is_bounded_also_where_it_is_asked_for_by_name_or_by_in(tmp_path: Path, expression: str) -> None:
+    with pytest.raises(nmm.RobotError, match="no robot needs as many"):
+        links(written(tmp_path / "a.xacro", f"<link name='x${{{expression}}}'/>"))
+
+
+def test_what_is_refused_is_said_shortly(tmp_path: Path) -> None:
+    error, _ = refusal(written(tmp_path / "a.xacro", f"<link name='${{(1).{'long' * 90}}}'/>"))
+    assert len(str(error).removeprefix(str(tmp_path))) <= 300

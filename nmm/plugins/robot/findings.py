@@ -39,7 +39,8 @@ WORDS: dict[str, Words] = {
     "off_task": "the task error is {m:.3g} m and {rad:.3g} rad at t = {t:.4g} s, more than allowed: stops",
     "outside_limits": _outside,
     "not_following": "in the second before t = {t:.4g} s {name} is measured {apart:.3g} {unit} off the way "
-    "of {way:.3g} {unit} that its inputs asked for: old positions with new times, or held: stops",
+    "of {way:.3g} {unit} that its inputs asked for (held, old positions with new times, or later than "
+    "`lag` and `slip` allow): stops",
     "call_late": "{samples:count call} late, from t = {t:.4g} to {end:.4g} s; at most {gap:.3g} s after the "
     "one before",
     "clock_jumped": "the clock jumped by {by:.4g} s at t = {t:.4g} s",

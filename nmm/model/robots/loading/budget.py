@@ -77,7 +77,7 @@ class Budget:
     def called(self, function: Any, *arguments: Any, **named: Any) -> Any:
         if function in _GROWING and max(map(abs, arguments), default=0) > 1_000:
             raise BeyondBound("bits in an integer", MOST_BITS)
-        digits = (*arguments, *named.values(), 0)[1] if function is round else 0
+        digits = named.get("ndigits", arguments[1] if len(arguments) > 1 else 0) if function is round else 0
         if isinstance(digits, int) and abs(digits) > MOST_DIGITS:
             raise BeyondBound("digits of a number", MOST_DIGITS)
         if function is sum or function is math.prod:

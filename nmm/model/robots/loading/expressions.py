@@ -95,6 +95,14 @@ class _Counted(ast.NodeTransformer):
         self.generic_visit(node)
         return node if self._trusted else _call("attribute", node.value, ast.Constant(node.attr))
 
+    def visit_Compare(self, node: ast.Compare) -> ast.expr:
+        self.generic_visit(node)  # `in` goes through all that there is
+        node.comparators = [
+            _call("took", item) if isinstance(operator, ast.In | ast.NotIn) else item
+            for operator, item in zip(node.ops, node.comparators, strict=True)
+        ]
+        return node
+
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
         self.generic_visit(node)  # a slice copies; an item by its number or name does not
         return node if isinstance(node.slice, ast.Constant) else _call("took", node)

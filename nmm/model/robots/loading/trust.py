@@ -17,12 +17,15 @@ from nmm.model.robots.loading.budget import RefusedContent
 if TYPE_CHECKING:
     from nmm.model.robots.loading.packages import Packages
 
+#: Of what a file asks for, so many characters are told.
+_TOLD = 100
 #: So many folders above a description may be the ROS package that it is of.
 _NEAR = 5
 
 
 def untrusted(what: str, text: str = "") -> RefusedContent:
-    return RefusedContent(Finding("xacro_untrusted", {"what": what}), text)
+    told = what if len(what) <= _TOLD else f"{what[: _TOLD - 3]}..."
+    return RefusedContent(Finding("xacro_untrusted", {"what": told}), text)
 
 
 def check_readable(name: str, packages: Packages, pattern: str = "") -> None:

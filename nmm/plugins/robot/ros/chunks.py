@@ -122,7 +122,7 @@ def decompressed(kind: str, data: bytes, size: int = MOST_OF_A_CHUNK) -> bytes:
     if len(content) > size:
         raise InputError(expected=f"a chunk of at most {size:,} bytes", got="more")
     if not made.eof:
-        raise InputError("a chunk that lacks its end")
+        raise ValueError("a chunk that lacks its end")  # as of other damage: what is before it is read
     return _counted(content)
 
 

@@ -63,9 +63,10 @@ class Log:
 
     def _opened(self, path: Path) -> list[_Indexed | _Streamed]:
         inside = sorted(path.iterdir(), key=_counted) if path.is_dir() else []
-        for file in inside:
-            _expect_readable(file)
         files = [file for file in inside if file.suffix in (".bag", ".mcap", ".db3")]
+        for file in inside:
+            if file in files or file.name == "metadata.yaml":
+                _expect_readable(file)
         whole = not path.is_dir() or (path / "metadata.yaml").exists()
         try:
             if whole:
