@@ -62,7 +62,8 @@ class Fixes(NamedTuple):
 
 class History(NamedTuple):
     """A filter in memory. gates (2,) : of positions, and of those with a heading; delay : s; odom (3,) : the
-    motions of all steps as they were first taken; newest, stored : of the steps; fixed : fixes in `order`."""
+    motions of all steps as they were first taken; newest, stored : of the steps; fixed : fixes in `order`;
+    outliers : in a row, the last of the fixes whose places are free again."""
 
     counted: Counted
     noise: Noise
@@ -74,6 +75,7 @@ class History(NamedTuple):
     newest: IntegerCell
     stored: IntegerCell
     fixed: IntegerCell
+    outliers: IntegerCell
 
 
 def new_history(
@@ -96,7 +98,7 @@ def new_history(
                 np.zeros(places),
                 *(np.zeros(places, np.int64), np.zeros(places, np.int64), np.arange(places, dtype=np.int64)),
             ),
-            *(gates, np.array(delay), odom, np.array(0), np.array(1), np.array(0)),
+            *(gates, np.array(delay), odom, np.array(0), np.array(1), np.array(0), np.array(0)),
         )
     )
     return memory.blocks()
@@ -255,6 +257,11 @@ def forget_fixes(history: History, before: float) -> None:
         old += 1
     for _ in range(old):
         first = fixes.order[0]
+        outcome = int(fixes.outcome[int(first)])
+        if outcome == USED:
+            history.outliers[()] = 0
+        elif outcome == OUTLIER:
+            history.outliers[()] += 1
         for n in range(last - 1):
             fixes.order[n] = fixes.order[n + 1]
         fixes.order[last - 1] = first

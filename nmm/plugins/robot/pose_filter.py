@@ -145,7 +145,8 @@ class PoseFilter:
         P[:3, :3] = turn.T @ covariance_of(covariance, f"{self._where}: covariance") @ turn
         steps.end[0], steps.ahead[0] = np.nextafter(t, -np.inf), self._joints[3 : self.robot.platform.n_p]
         steps.x[0], steps.P[0] = x, P
-        self._history.newest[()], self._history.stored[()], self._history.fixed[()] = 0, 1, 0
+        self._history.newest[()], self._history.stored[()] = 0, 1
+        self._history.fixed[()] = self._history.outliers[()] = 0
         self.step(t, self._still)  # fixes of this time count from here on
 
     def update(self, encoders: Mapping[str, float], t: float, yaw_rate: float | None = None) -> Array:
@@ -316,6 +317,6 @@ class PoseFilter:
         fixes, count = self._history.fixes, 0
         for place in fixes.order[: self._history.fixed[()]][::-1]:
             if fixes.outcome[place] == rings.USED:
-                break
+                return count
             count += int(fixes.outcome[place] == rings.OUTLIER)
-        return count
+        return count + int(self._history.outliers[()])

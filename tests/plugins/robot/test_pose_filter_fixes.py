@@ -73,6 +73,22 @@ def test_outliers_change_nothing_and_are_counted() -> None:
     assert with_bad.outliers == 0
 
 
+def test_outliers_are_counted_in_a_row_however_seldom_they_come() -> None:
+    """Fixes at 1 Hz, each long forgotten when the next comes; one that is used ends the row."""
+    pose_filter, counts = make(spread=1e-4), []
+    for k in range(1, 1501):
+        pose_filter.step(0.01 * k, [0.0, 0.0])
+        if k % 100 == 0:
+            place = np.array([0.0, 0.0] if k == 1100 else [9.0, 9.0])
+            assert pose_filter.fix(place, 0.01 * np.eye(2), pose_filter.t) == (
+                "used" if k == 1100 else "outlier"
+            )
+            counts.append(pose_filter.outliers)
+    assert counts == [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 0, 1, 2, 3, 4]
+    pose_filter.restart([9.0, 9.0, 0.0], np.diag([0.1, 0.1, 0.1]))
+    assert pose_filter.outliers == 0
+
+
 def test_the_gate_lets_through_the_share_that_it_says() -> None:
     """Of fixes drawn as they say, 90 %: within 3 standard deviations of a binomial count."""
     rng, passed, count = np.random.default_rng(2), 0, 2000
