@@ -219,7 +219,8 @@ def add_fix(integers: Integers, floats: Array, t: float, y: Array, covariance: A
         return LATE
     if t > steps.end[newest] + history.delay[()]:
         return EARLY
-    forget_fixes(history, steps.end[oldest])
+    recent = steps_since(history, steps.end[newest] - history.delay[()])
+    forget_fixes(history, steps.end[(newest - recent) % count])
     last = int(history.fixed[()])
     if last == fixes.t.shape[0]:
         return CROWDED
@@ -236,16 +237,23 @@ def add_fix(integers: Integers, floats: Array, t: float, y: Array, covariance: A
         last -= 1
     fixes.order[last] = fix
     history.fixed[()] += 1
-    again = 0
-    while again < history.stored[()] - 1 and steps.end[(newest - again) % count] >= t:
-        again += 1
     unused = scratch(3)
     for i in range(3):
         unused[i] = 0.0
-    for back in range(again - 1, -1, -1):
+    for back in range(steps_since(history, t) - 1, -1, -1):
         k = (newest - back) % count
         take_step(history, k, (k - 1) % count, unused)
     return int(fixes.outcome[fix])
+
+
+@compiled
+def steps_since(history: History, t: float) -> int:
+    """How many of the newest steps end at a time t, s, or later; what the oldest began from is none."""
+    steps, many = history.steps, 0
+    count, newest = steps.end.shape[0], int(history.newest[()])
+    while many < history.stored[()] - 1 and steps.end[(newest - many) % count] >= t:
+        many += 1
+    return many
 
 
 @compiled

@@ -58,6 +58,21 @@ def test_fixes_beyond_the_delay_change_nothing() -> None:
     assert crowd[-2:] == ["used", "crowded"]
 
 
+def test_only_fixes_within_the_delay_crowd() -> None:
+    """Encoders at 10 Hz, for which the steps that are stored last 10 s; 4 fixes a step, up to 0.49 s late.
+    In each `delay` of 0.5 s there are 20: 30 places do what 1000 do."""
+    ample, short = (make(spread=1e-3, fixes=places) for places in (1000, 30))
+    for k in range(1, 121):
+        for pose_filter in (ample, short):
+            pose_filter.step(0.1 * k, [0.1, 0.1])
+            for late in (0.0, 0.05, 0.31, 0.49):
+                place = [0.1 * RADIUS * (k - 10.0 * late), 0.01 * math.sin(k)]
+                outcome = pose_filter.fix(place, 0.01 * np.eye(2), 0.1 * k - min(late, 0.1 * k))
+                assert outcome == "used", (k, late)
+    np.testing.assert_array_equal(short.pose, ample.pose)
+    np.testing.assert_array_equal(short.state_covariance, ample.state_covariance)
+
+
 def test_outliers_change_nothing_and_are_counted() -> None:
     good = fixes_of([0.0] * 8)
     bad = [(t, t, np.array([9.0, 9.0])) for t in (0.02 * 85, 0.02 * 88)]  # at readings: no step is split
