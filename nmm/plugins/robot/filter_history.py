@@ -35,8 +35,9 @@ SYMMETRIC = 1e-9
 
 
 class Steps(NamedTuple):
-    """A ring of N steps: from `start` to `end` (N,), s, the counters counted `by` (N, k); at the end the own
-    joints are `ahead` (N, n_p - 3); mean gyro `rate` (N,), NaN without; x (N, d), P (N, d, d) at the end."""
+    """A ring of N steps, one of them spare: from `start` to `end` (N,), s, the counters counted `by` (N, k);
+    at the end the own joints are `ahead` (N, n_p - 3); mean gyro `rate` (N,), NaN without; x (N, d), P
+    (N, d, d) at the end."""
 
     start: Vector
     end: Vector
@@ -83,6 +84,7 @@ def new_history(
 ) -> Blocks:
     """The blocks of a history with room for steps and fixes, and d numbers of the state (`sizes`)."""
     steps, places, d = sizes
+    steps += 1  # what is stored stays while the next step is tried
     k, joints = counted.sources.shape[0], max(counted.coordinates - 3, 0)
     memory = Memory()
     memory.add(
@@ -179,7 +181,7 @@ def advance(integers: Integers, floats: Array, t: float, by: Array, ahead: Array
             return False
     copied(odom, history.odom)
     history.newest[()] = k
-    history.stored[()] = min(history.stored[()] + 1, steps.end.shape[0])
+    history.stored[()] = min(history.stored[()] + 1, steps.end.shape[0] - 1)
     return True
 
 

@@ -183,6 +183,25 @@ def test_names_cost_little_beside_a_step() -> None:
     assert times["update"] < 10 * times["step"]
 
 
+def test_a_step_that_is_refused_changes_nothing_where_all_places_are_taken() -> None:
+    """At each number of steps: a late fix after it, and a step, do what they do without it."""
+    options: dict[str, Any] = {"spread": 1e-3, "delay": 0.5, "rate": 10.0}
+    for count in range(1, 20):
+        filters = make(**options), make(**options)
+        for pose_filter in filters:
+            for k in range(1, count + 1):
+                pose_filter.step(0.1 * k, [0.1, 0.12])
+                pose_filter.fix([0.01 * k, 0.01], 0.01 * np.eye(2), 0.1 * k)
+        with pytest.raises(InputError):
+            filters[1].step(filters[1].t + 0.1, [1e308, 1e308])
+        for pose_filter in filters:
+            t = pose_filter.t
+            assert pose_filter.fix([0.01 * count, 0.02], 0.01 * np.eye(2), max(t - 0.49, 0.0)) == "used"
+            pose_filter.step(t + 0.1, [0.1, 0.1])
+        np.testing.assert_array_equal(filters[1].pose, filters[0].pose)
+        np.testing.assert_array_equal(filters[1].state_covariance, filters[0].state_covariance)
+
+
 def test_readings_come_in_any_order_and_number() -> None:
     """A trailer's hitch is measured at times, in another order; where it is not, it rolls."""
     robot = nmm.load("trailer_base")
