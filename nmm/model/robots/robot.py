@@ -234,6 +234,7 @@ class Robot(Coordinates):
         wrapped : True, or names, for wheels that are read within one turn, (-π, π] or [0, 2π): no step may be
             more than half a turn, and `update` refuses those that could be; False for counters that count
             turns; by default as the readings show, with a warning where a turn ended
+        t : when the readings were taken, s; without it the first `update` checks none against `fastest`
 
         Raises
         ------

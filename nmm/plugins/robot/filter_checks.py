@@ -31,11 +31,11 @@ def gates_of(share: float) -> tuple[float, float]:
 
 
 def float_array(value: ArrayLike) -> Array:
-    """A contiguous float64 array, empty for what is no array of numbers."""
+    """A contiguous float64 array; an empty matrix, which fits nothing, for what is no array of numbers."""
     try:
         return np.ascontiguousarray(value, dtype=np.float64)
     except (TypeError, ValueError):
-        return np.zeros(0)
+        return np.zeros((0, 0))
 
 
 def turned_axes(theta: float) -> Array:
@@ -71,6 +71,7 @@ def noise_of(
     variances = by_counter(spread, names, np.zeros(len(names)), f"{where}: spread")
     expect(bool((variances >= 0.0).all()), f"{where}: spread", "numbers from 0", variances)
     slips = vector(slip_noise, 3, f"{where}: slip_noise")
+    expect(bool((slips >= 0.0).all()), f"{where}: slip_noise", "numbers from 0", slips)
     gyro = 0.0 if gyro_noise is None else positive(gyro_noise, f"{where}: gyro_noise")
     known = {
         what: [scalar(x, f"{where}: {what}_{name}", least=0.0) for x, name in zip(both, WALKING, strict=True)]

@@ -126,6 +126,7 @@ class Odometry:
         covariance: ArrayLike | None = None,
         fastest: float | Mapping[str, float] | None = None,
         wrapped: bool | Collection[str] | None = None,
+        t: float | None = None,
     ) -> None:
         self._where = f"odometry: {robot.name}"
         if robot.platform.n_p < 3:
@@ -142,7 +143,7 @@ class Odometry:
         limits = {wheel.joint: wheel.velocity for wheel in robot.wheels}
         usual = np.array([limits.get(name, math.inf) for name in counted])
         self._fastest = by_counter(fastest, counted, usual, f"{self._where}: fastest").tolist()
-        self._t = math.nan
+        self._t = math.nan if t is None else scalar(t, f"{self._where}: t")
         #: How far the counters went at the last update (k,), rad or m.
         self.last_counts = np.zeros(len(counted))
         self._spread = np.full(len(counted), scalar(spread, f"{self._where}: spread", least=0.0))

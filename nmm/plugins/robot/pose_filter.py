@@ -110,7 +110,8 @@ class PoseFilter:
     ) -> None:
         self._where = where = f"PoseFilter: {robot.name}"
         self.robot = robot
-        self._odometry = Odometry(robot, q, encoders, slip, fastest=fastest, wrapped=wrapped)
+        t = scalar(t, f"{where}: t")
+        self._odometry = Odometry(robot, q, encoders, slip, fastest=fastest, wrapped=wrapped, t=t)
         self.counters = self._odometry.counters
         self._has_gyro = gyro_noise is not None
         walking = {
@@ -134,7 +135,7 @@ class PoseFilter:
         self._advance = checked_by_caller(rings.advance, rings.ADVANCE)
         self._add_fix = checked_by_caller(rings.add_fix, rings.ADD_FIX)
         self._still = np.zeros(len(self.counters))
-        self._start(scalar(t, f"{where}: t"), self._joints[:3], covariance, np.zeros(len(P)), P)
+        self._start(t, self._joints[:3], covariance, np.zeros(len(P)), P)
 
     def _start(self, t: float, pose: ArrayLike, covariance: ArrayLike, x: Array, P: Array) -> None:
         """Begin at t with a pose (3,), of covariance (3, 3), and else with x (d,) and P (d, d)."""
@@ -162,7 +163,7 @@ class PoseFilter:
         ------
         InputError : as of `Odometry.update`, and of `step`; nothing is changed then
         """
-        t = self._check_step(t, yaw_rate)
+        t, yaw_rate = self._check_step(t, yaw_rate)
         self._joints = self._odometry.update(encoders, t)
         self._take(t, self._odometry.last_counts, self._joints[3 : self.robot.platform.n_p], yaw_rate)
         return self.q
@@ -178,28 +179,30 @@ class PoseFilter:
         InputError : t is not later than before, other lengths, numbers that are not finite; nothing is
             changed then
         """
-        t = self._check_step(t, yaw_rate)
+        t, yaw_rate = self._check_step(t, yaw_rate)
         steps = self._history.steps
-        by = np.ascontiguousarray(by, dtype=np.float64)
-        joints = steps.ahead[self._history.newest[()]] if own is None else own
-        joints = np.ascontiguousarray(joints, dtype=np.float64)
-        if by.shape != self._still.shape or joints.shape != steps.ahead[0].shape:
+        own = steps.ahead[self._history.newest[()]] if own is None else own
+        counts, joints = float_array(by), float_array(own)
+        if counts.shape != self._still.shape or joints.shape != steps.ahead[0].shape:
             expected = f"{self._still.size} counters and {steps.ahead.shape[1]} joints"
-            raise InputError(where=f"{self._where}: step", expected=expected, got=(by, joints))
-        self._take(t, by, joints, yaw_rate)
+            raise InputError(where=f"{self._where}: step", expected=expected, got=(by, own))
+        self._take(t, counts, joints, yaw_rate)
 
-    def _check_step(self, t: float, yaw_rate: float | None) -> float:
+    def _check_step(self, t: float, yaw_rate: float | None) -> tuple[float, float]:
+        """Both as numbers, NaN for no yaw rate."""
         if not isinstance(t, float):
             t = scalar(t, f"{self._where}: t")
         if not self.t < t < math.inf:
             raise InputError(where=f"{self._where}: t", expected=f"a time after {self.t:g} s", got=t)
-        if yaw_rate is not None and not (self._has_gyro and math.isfinite(yaw_rate)):
-            expected = "a finite number" if self._has_gyro else "a filter with gyro_noise"
-            raise InputError(where=f"{self._where}: yaw_rate", expected=expected, got=yaw_rate)
-        return t
+        if yaw_rate is None:
+            return t, math.nan
+        where = f"{self._where}: yaw_rate"
+        if not self._has_gyro:
+            raise InputError(where=where, expected="a filter with gyro_noise", got=yaw_rate)
+        return t, scalar(yaw_rate, where)
 
-    def _take(self, t: float, by: Array, joints: Array, yaw_rate: float | None) -> None:
-        if not self._advance(*self._blocks, t, by, joints, math.nan if yaw_rate is None else yaw_rate):
+    def _take(self, t: float, by: Array, joints: Array, yaw_rate: float) -> None:
+        if not self._advance(*self._blocks, t, by, joints, yaw_rate):
             expected = "finite numbers, of counters that determine the inputs"
             raise InputError(where=f"{self._where}: step", expected=expected, got=(by, joints))
 

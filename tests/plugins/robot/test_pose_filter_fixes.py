@@ -220,8 +220,20 @@ def test_readings_come_in_any_order_and_number() -> None:
             assert q[robot.coordinate(name)] == angle
 
 
+def test_the_first_readings_are_checked_for_jumps_too() -> None:
+    """At 5 rad/s a wheel turns 0.05 rad in 10 ms; with what stamps may be off, at most 0.175 rad."""
+    for turned, jumped in ((3.0, True), (0.18, True), (0.17, False)):
+        pose_filter = make(fastest=5.0)
+        if not jumped:
+            pose_filter.update(dict.fromkeys(STILL, turned), 0.01)
+            continue
+        with pytest.raises(InputError, match="jumped"):
+            pose_filter.update(dict.fromkeys(STILL, turned), 0.01)
+        assert (pose_filter.t, pose_filter.pose.tolist()) == (0.0, [0.0] * 3)
+
+
 def test_bad_input_is_named_and_changes_nothing() -> None:
-    pose_filter = make(spread=1e-4)
+    pose_filter, with_gyro = make(spread=1e-4), make(gyro_noise=0.1)
     pose_filter.step(0.1, [0.1, 0.1])
     before, P, odom = pose_filter.pose, pose_filter.state_covariance, pose_filter.odom
     assert pose_filter.fix([0.0, 0.0], np.eye(2), 0.15) == "waiting"
@@ -233,6 +245,11 @@ def test_bad_input_is_named_and_changes_nothing() -> None:
         (lambda: pose_filter.step(0.2, [1e308, 1e308]), "finite numbers"),
         (lambda: pose_filter.step(0.2, [0.1]), "2 counters and 0 joints"),
         (lambda: pose_filter.step(0.2, [0.1, 0.1], yaw_rate=0.1), "a filter with gyro_noise"),
+        (lambda: pose_filter.step(0.2, ["a", "b"]), "2 counters and 0 joints"),
+        (lambda: pose_filter.step(0.2, [0.1, 0.1], "a"), "2 counters and 0 joints"),
+        (lambda: with_gyro.step(0.2, [0.1, 0.1], yaw_rate="x"), "numbers"),
+        (lambda: with_gyro.step(0.2, [0.1, 0.1], yaw_rate=math.nan), "finite numbers"),
+        (lambda: with_gyro.update(STILL, 0.2, "x"), "numbers"),  # type: ignore[arg-type]
         (lambda: pose_filter.update({"left_wheel_joint": 0.1}, 0.2), ""),
         (lambda: pose_filter.fix([0.0], np.eye(1), 0.1), "2 or 3 numbers"),
         (lambda: pose_filter.fix([0.0, math.inf], np.eye(2), 0.1), "finite numbers"),
@@ -246,6 +263,7 @@ def test_bad_input_is_named_and_changes_nothing() -> None:
         (lambda: pose_filter.restart([0.0, math.nan, 0.0], np.eye(3)), "finite numbers"),
         (lambda: make(gate=1.0), "a number above 0 and below 1"),
         (lambda: make(spread=-1.0), "numbers from 0"),
+        (lambda: make(slip_noise=(0.01, -0.01, 0.01)), "numbers from 0"),
         (lambda: make(delay=0.0), "a number above 0"),
         (lambda: make(spread={"wheel": 1.0}), ""),
     ]
