@@ -313,6 +313,6 @@ class Loop:
         write : sends u (m,) to the drives, which hold it
         each : called with the loop after each write, for what is done beside: targets, `stop`
         duration : s
-        clock, sleep : others for tests
+        clock, sleep : others, as where measurements are stamped by another clock, and for tests
         """
         keep_pace(self, read, write, each, duration, clock, sleep)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import collections
 import json
 import os
+import re
 import subprocess
 import sys
 from types import SimpleNamespace as Message
@@ -201,6 +203,72 @@ def test_a_filter_speaks_in_messages_with_its_frames_apart() -> None:
     np.testing.assert_allclose(matrix_of(in_map), matrix_of(pose_filter.pose), atol=1e-12)
     np.testing.assert_allclose(matrix_of(in_odom), matrix_of(pose_filter.odom), atol=1e-12)
     assert np.abs(in_map - in_odom).max() > 0.01
+
+
+class Node:
+    """A ROS node whose clock goes on by half a millisecond whenever it is read, and which is its own
+    localisation and driver of a robot that stands: fixes of the last time that was read, of which one is in
+    another frame, and one of a covariance that is not known."""
+
+    def __init__(self, readings: dict[str, float]) -> None:
+        self.readings, self.warned = readings, list[str]()
+        self.nanoseconds = 1_800_000_000_000_000_000
+        self.reads = self.writes = 0
+        self.warning = self.warned.append
+
+    def get_clock(self) -> Node:
+        return self
+
+    def now(self) -> Message:
+        self.nanoseconds += 500_000
+        return Message(nanoseconds=self.nanoseconds)
+
+    def get_logger(self) -> Node:
+        return self
+
+    def encoders(self) -> dict[str, float]:
+        self.reads += 1
+        return self.readings
+
+    def yaw_rate(self) -> float:
+        return 0.0
+
+    def new(self) -> list[Message]:
+        covariance = np.diag([0.01] * 6).ravel()
+        if self.reads == 4:
+            covariance[0] = -1.0
+        turn = Message(x=0.0, y=0.0, z=0.0, w=1.0)
+        pose = Message(position=Message(x=0.0, y=0.0, z=0.0), orientation=turn)
+        sec, nanosec = divmod(self.nanoseconds, 1_000_000_000)
+        frame = "odom" if self.reads == 2 else "map"
+        header = Message(frame_id=frame, stamp=Message(sec=sec, nanosec=nanosec))
+        return [Message(header=header, pose=Message(pose=pose, covariance=covariance))]
+
+    def write(self, u: Array) -> None:
+        self.writes += 1
+        if self.writes == 8:
+            raise StopIteration("that is enough")
+
+
+def test_the_example_of_the_page_uses_its_fixes_and_bears_messages_that_are_none() -> None:
+    """`docs/deploy.md`, as it is, with a driver that ends it."""
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "deploy.md").read_text("utf-8"), re.S)
+    [example] = [block for block in blocks if "nmm.PoseFilter(" in block]
+    robot = nmm.load("unicycle_2r", platform="differential")
+    names = (*robot.wheel_speeds(np.zeros(2)), "q1", "q2")
+    encoders = dict(zip(names, (0.0, 0.0, 0.3, 0.9), strict=True))
+    task = nmm.Task(nmm.Position("ee", "xy"), np.array([3.0, 0.5]), gain=1.0)
+    controller = nmm.Controller(robot, task, nmm.DampedLeastSquares(alpha=1), dt=0.005)
+    node = Node(encoders)
+    names_of_page = {
+        "nmm": nmm, "np": np, "collections": collections, "robot": robot,
+        "start": robot.q({"q1": 0.3, "q2": 0.9}), "encoders": encoders, "controller": controller,
+        "node": node, "driver": node, "localisation": node,
+    }  # fmt: skip
+    with pytest.raises(StopIteration, match="enough"):
+        exec(example, names_of_page)
+    assert len(node.warned) == 2
+    assert names_of_page["outcomes"] == {"used": node.reads - 2, "refused": 2}
 
 
 def test_a_covariance_that_is_not_known_is_no_fix() -> None:
