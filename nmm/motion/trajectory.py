@@ -17,6 +17,7 @@ from nmm.base.findings import Finding
 from nmm.base.findings.run import line
 from nmm.base.lazy_call import lazy_call
 from nmm.base.machine import made_with
+from nmm.base.trust import trusting
 from nmm.control.sequencing.sequence import Event
 from nmm.control.step.quantities import QUANTITIES, Record
 from nmm.model.collisions.obstacle import Obstacle, obstacle_places
@@ -286,14 +287,17 @@ class Trajectory:
         return written
 
     @staticmethod
-    def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
-        """Read a run's folder; with the robot it ran on, if that was put together in Python.
+    def load(folder: str | Path, robot: Robot | None = None, *, trust: bool = False) -> Trajectory:
+        """Read a run's folder; with the robot it ran on, if that was put together in Python. `trust`: of the
+        robot's file, as of `nmm.load`.
 
         Raises
         ------
         InputError : it is no run's folder, or its robot cannot be loaded, or is another one
         """
-        return lazy_call("nmm.views.folders.run:load")(folder, robot)
+        with trusting(trust):
+            run: Trajectory = lazy_call("nmm.views.folders.run:load")(folder, robot)
+            return run
 
     def plot(self, **options: float) -> Figure:
         """One figure that shows the run: the motion from above, errors, objective, inputs; `width`, in."""

@@ -258,6 +258,16 @@ def test_a_scenarios_robot_is_trusted_by_whoever_runs_it(tmp_path: Path) -> None
         assert scenario.robot().n == 3
 
 
+def test_a_runs_robot_is_trusted_by_whoever_loads_it(tmp_path: Path) -> None:
+    file = written(tmp_path / "r.xacro", "<link name=\"${'a'.upper()}\"/>")
+    robot = nmm.load(file, platform="unicycle", wheels=[], trust=True)
+    controller = nmm.Controller(robot, nmm.Task(nmm.Posture("x"), [1.0]), nmm.ProjectedGradient())
+    nmm.simulate(controller, robot.rest, 0.02, 0.01).save(tmp_path / "run", figures=False)
+    with pytest.raises(nmm.InputError, match="trust"):
+        nmm.Trajectory.load(tmp_path / "run")
+    assert len(nmm.Trajectory.load(tmp_path / "run", trust=True)) == 3
+
+
 def test_scenarios_cannot_trust_themselves() -> None:
     assert "trust" not in nmm.Scenario.load("unicycle_2r_position").resolved()["robot"]
     with pytest.raises(nmm.ScenarioError):

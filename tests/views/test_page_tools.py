@@ -17,6 +17,7 @@ from playwright.sync_api import Page
 
 import nmm
 from nmm.model.robots.robot import Robot
+from nmm.views.playback import write_html
 
 #: The axes that are seen, each with the node that it is drawn at.
 SEEN = """() => {
@@ -34,7 +35,7 @@ SEEN = """() => {
 
 def test_frames_of_links_and_tools_are_shown_where_they_are(tmp_path: Path, window: Window) -> None:
     motion = run("unicycle_2r_position", "rg", duration=2.0)
-    page = window.open(file_url([motion], tmp_path))  # type: ignore[list-item]
+    page = window.open(write_html([motion], tmp_path / "page.html").as_uri())
     assert "platform's path" in (page.locator("#legend").text_content() or "")  # the thin line
     assert page.evaluate(SEEN) == []
     page.keyboard.press("t")

@@ -249,7 +249,7 @@ def test_bad_input_is_named_and_changes_nothing() -> None:
         (lambda: pose_filter.step(0.2, [0.1, 0.1], "a"), "2 counters and 0 joints"),
         (lambda: with_gyro.step(0.2, [0.1, 0.1], yaw_rate="x"), "numbers"),
         (lambda: with_gyro.step(0.2, [0.1, 0.1], yaw_rate=math.nan), "finite numbers"),
-        (lambda: with_gyro.update(STILL, 0.2, "x"), "numbers"),  # type: ignore[arg-type]
+        (lambda: with_gyro.update(STILL, 0.2, "x"), "numbers"),  # type: ignore[arg-type]  # on purpose
         (lambda: pose_filter.update({"left_wheel_joint": 0.1}, 0.2), ""),
         (lambda: pose_filter.fix([0.0], np.eye(1), 0.1), "2 or 3 numbers"),
         (lambda: pose_filter.fix([0.0, math.inf], np.eye(2), 0.1), "finite numbers"),
