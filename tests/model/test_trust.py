@@ -34,7 +34,7 @@ def links(file: Path, **options: object) -> list[str]:
 def refusal(file: Path, **options: object) -> tuple[nmm.RobotError, nmm.Finding]:
     with pytest.raises(nmm.RobotError) as caught:
         links(file, **options)
-    assert len(str(caught.value)) <= 300
+    assert len(str(caught.value).replace(str(file.parent), "")) <= 300  # wherever the tests run
     (found,) = caught.value.findings
     assert found.code == "xacro_untrusted"
     assert "--trust" in str(caught.value)
@@ -391,4 +391,4 @@ def test_work_is_bounded_also_where_it_is_asked_for_by_name_or_by_in(tmp_path: P
 
 def test_what_is_refused_is_said_shortly(tmp_path: Path) -> None:
     error, _ = refusal(written(tmp_path / "a.xacro", f"<link name='${{(1).{'long' * 90}}}'/>"))
-    assert len(str(error).removeprefix(str(tmp_path))) <= 300
+    assert "..." in str(error)
