@@ -395,7 +395,7 @@ EXAMPLES: dict[str, tuple[dict[str, Any], str]] = {
     "not_following": (
         {"name": "q1", "apart": 0.32, "way": 0.45, "unit": "rad", "samples": 1, "end": 1.5},
         "in the second before t = 1.5 s q1 is measured 0.32 rad off the way of 0.45 rad that its inputs "
-        "asked for: old positions with new times, or held: stops",
+        "asked for (held, old positions with new times, or later than `lag` and `slip` allow): stops",
     ),
     "call_late": (
         {"gap": 0.03, "samples": 1, "end": 1.5},
