@@ -260,7 +260,7 @@ def test_a_copy_moves_where_odometry_has_the_robot(
             np.testing.assert_allclose(believed[:3, 3] - real[:3, 3], [0.1 * t, 0.0, 0.0], atol=1e-4)
     shown = "nmm.node('/nmm/motion 0/believed').visible"
     assert page.evaluate(shown)
-    page.locator("#legend button", has_text="odometry").click()
+    page.locator("#legend button", has_text="believed").click()
     assert not page.evaluate(shown)
     assert page.evaluate("nmm.node('/nmm/motion 0/robot').visible")
 
@@ -334,13 +334,13 @@ def test_texts_have_a_rim_and_names_of_axes_lie_on_none(
     page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]  # mypy takes each for any text
     axes = """() => {
       viewer.render();
-      return nmm.texts.all.filter(({ rank }) => rank === 4).map(({ sprite }) => sprite.material.visible);
+      return nmm.texts.all.filter(({ rank }) => rank === 5).map(({ sprite }) => sprite.material.visible);
     }"""
     assert page.evaluate(axes) == [True] * 3
     # How dark and how light a text is, from 0 to 1.
     low, high = page.evaluate(
         """() => {
-          const { sprite } = nmm.texts.all.find(({ rank }) => rank === 4);
+          const { sprite } = nmm.texts.all.find(({ rank }) => rank === 5);
           nmm.texts.add("12 s", sprite.getWorldPosition(new MeshCat.THREE.Vector3()));
           const added = nmm.texts.all[nmm.texts.all.length - 1].sprite;
           viewer.scene.add(added);
