@@ -105,6 +105,7 @@ def test_ghosts_paths_and_motions_can_be_hidden(small_robot: Robot, window: Wind
         "PG",
         "desired path",
         "target",
+        "platform's path",
         "grid of 0.1 m",
     ]
     visible = "(paths) => paths.map((path) => nmm.node(path).visible)"
