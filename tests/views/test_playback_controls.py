@@ -241,4 +241,4 @@ def test_hostile_names_are_only_text(small_robot: Robot, window: Window, tmp_pat
     page = window.open(file_url([drive(small_robot, duration=0.5, label=name)], tmp_path, title=name))
     assert page.title() == name
     assert page.locator("h1").inner_text() == name
-    assert page.locator("#legend li").all_inner_texts() == [name, "grid of 0.1 m"]
+    assert page.locator("#legend li").all_inner_texts() == [name, "platform's path", "grid of 0.1 m"]
