@@ -215,3 +215,17 @@ def test_what_is_never_below_zero_has_no_axis_there(page: Page) -> None:
         axis = page.evaluate(over.replace("VALUES", numbers))
         assert -0.05 * axis["high"] <= axis["low"] <= 0.0
     assert page.evaluate(over.replace("VALUES", "0, 0, 0").replace("0, null", "null, null"))["low"] < -0.5
+
+
+def test_ends_that_no_number_tells_are_not_zoomed_to(page: Page) -> None:
+    """Where the ends are one number, or none, to look for numbers between them would never end."""
+    for low, high, log in ((-400, -399, True), (300, 301, True), (-3, -3 + 1e-9, True), (1.0, 1.0, False)):
+        assert not page.evaluate(f"nmm.axes.told({low}, {high}, {str(log).lower()})")
+    for low, high, log in (
+        (-299, 299, True),
+        (-3.0, -2.99999, True),
+        (-1e-79, 1e-79, False),
+        (-9e249, 9e249, False),
+    ):
+        assert page.evaluate(f"nmm.axes.told({low}, {high}, {str(log).lower()})")
+        assert page.evaluate(f"nmm.axes.ticks({{ low: {low}, high: {high}, log: {str(log).lower()} }}, 84)")

@@ -65,8 +65,11 @@
     return { log: false, low: low - (never && low === 0 ? 0.5 * room : room), high: high + room, limits: [...limits], ...zoom };
   };
 
-  // Whether numbers tell the ends of an axis from each other.
-  axes.told = (low, high) => high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high), 1e-250) && high - low < 1e250;
+  // Whether numbers can tell the ends of an axis, and from each other: those of a logarithmic one are powers.
+  axes.told = (low, high, log) => {
+    const most = Math.max(Math.abs(low), Math.abs(high));
+    return most < (log ? 300 : 1e250) && high - low > Math.max(1e-9 * most, log ? 1e-6 : 1e-80);
+  };
 
   // The least of 1, 2, 4 or 5 times a power of ten of which no more than `most` lie between two values: that
   // leaves at least two of them, for `most` of 3 or more.

@@ -216,7 +216,7 @@
       return panel.lanes.find((lane) => lane.scale && event.offsetY >= lane.top && event.offsetY < lane.bottom) ?? null;
     };
     const set = (lane, low, high) => {
-      if (!nmm.axes.told(low, high)) return;
+      if (!nmm.axes.told(low, high, lane.scale.log)) return;
       lane.zoom = { low, high };
       panel.stale = true;
       plots.draw();
