@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, fields, is_dataclass
 from functools import partial, wraps
 from pathlib import Path
@@ -15,7 +15,7 @@ from typer.models import ParameterInfo
 
 from nmm.base.errors import InputError, expect_known
 from nmm.base.kinds import PLATFORMS
-from nmm.base.plugins import OptionGroup, complain, groups_of_options
+from nmm.base.plugins import Beside, OptionGroup, complain, groups_of_options
 from nmm.base.text_format import listed
 from nmm.base.trust import trusting
 from nmm.cli.options import (
@@ -62,6 +62,12 @@ class AddedOptions:
             if (status := group.answer(*subject)) is not None:
                 return status
         return None
+
+    @contextmanager
+    def beside(self, scenario: Any, controller: Any) -> Iterator[list[Beside]]:
+        """What each has to go on beside a run."""
+        with ExitStack() as stack:
+            yield [stack.enter_context(group.beside(scenario, controller)) for group in self.groups]
 
 
 @dataclass(frozen=True)
@@ -189,6 +195,11 @@ class OfRobot(Trust):
         "The joints that only roll, each with its radius in m or all without; none for no wheels.",
         show="those named so",
     )
+    calibration: str | None = option(
+        "FILE",
+        "A calibration.yaml: wheels, lengths and steered joints as they were learned of this robot.",
+        show="the scenario's; none of a robot",
+    )
     missing_meshes: str | None = option(
         "error|skip",
         "What to do about meshes that are not there: refuse the robot, or leave their shapes out.",
@@ -200,6 +211,7 @@ class OfRobot(Trust):
         given = {
             "lock": values_of(self.lock, "--lock", "JOINT=VALUE, as in torso=0.2") or None,
             "wheels": wheels_of(self.wheels),
+            "calibration": self.calibration,
             "missing_meshes": self.missing_meshes,
         }
         return {name: value for name, value in given.items() if value is not None}

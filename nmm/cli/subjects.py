@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from nmm.scenario import Scenario
 
 #: The arguments of `nmm.load` that a scenario's robot takes, too.
-_OF_SCENARIO = ("lock", "wheels", "missing_meshes")
+_OF_SCENARIO = ("lock", "wheels", "calibration", "missing_meshes")
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +94,8 @@ def studied(
 
 
 def scenario_with(scenario: Scenario, loading: Mapping[str, Any]) -> Scenario:
-    """The scenario with `lock`, `wheels` and `missing_meshes` of `nmm.load` for its robot, where given;
-    `InputError` where its robot is mounted from several."""
+    """The scenario with what `nmm.load` takes (`_OF_SCENARIO`) for its robot, where given; `InputError` where
+    its robot is mounted from several."""
     from nmm.scenario.robot import RobotPart
 
     robot, settings = scenario.parts.robot, {key: loading[key] for key in _OF_SCENARIO if key in loading}

@@ -41,7 +41,7 @@ def record_run(
     progress: Callable[[float], None] | None = None,
     until: Goal | None = None,
     leg: Leaving | None = None,
-    watch: Callable[[Recorder], None] | None = None,
+    watch: Callable[[Recorder], object] | None = None,
 ) -> tuple[Recorder, RunEnd]:
     """Run over the times (N,) from q; `watch` gets the recorder first."""
     recorder = Recorder(controller, times)
@@ -70,7 +70,7 @@ def run_legs(
     q: Array,
     progress: Callable[[float], None] | None = None,
     until: Goal | None = None,
-    watch: Callable[[Recorder], None] | None = None,
+    watch: Callable[[Recorder], object] | None = None,
 ) -> list[Leg]:
     """The run of tasks that come and go, a leg for each set of active tasks from event to event; an event's
     sample is the next leg's."""

@@ -35,7 +35,7 @@ def simulate(
     tolerance: float = 1e-9,
     progress: Callable[[float], None] | None = None,
     until: Goal | None = None,
-    watch: Callable[[Recorder], None] | None = None,
+    watch: Callable[[Recorder], object] | None = None,
     disturbances: Disturbances | None = None,
 ) -> Trajectory:
     """Integrate q_dot = S(q) u(t, q) from q0 over `duration`, sampled every dt; at order 2 also

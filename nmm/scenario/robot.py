@@ -125,6 +125,11 @@ class RobotPart(KeyedPart):
         description="MoveIt's file of postures and groups, relative to the scenario, or "
         "package://PACKAGE/PATH; by default the one beside the robot's file",
     )
+    calibration: FileName | None = Field(
+        None,
+        description="a calibration.yaml, the robot's numbers as they were learned, relative to the scenario, "
+        "or package://PACKAGE/PATH; by default those of its file",
+    )
     missing_meshes: Literal["error", "skip"] = Field(
         "error", description="error, or skip to leave out shapes whose mesh is not there"
     )

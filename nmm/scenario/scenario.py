@@ -210,7 +210,7 @@ class Scenario:
         self,
         progress: Progress | None = None,
         controller: Controller | None = None,
-        watch: Callable[[Recorder], None] | None = None,
+        watch: Callable[[Recorder], object] | None = None,
     ) -> Trajectory:
         """Run it; a run that fails or is interrupted (Ctrl-C) returns what was computed. With the key `plan`
         it is the planned motion, or follows it (`plan.track`); `RunError` where none is found.

@@ -341,6 +341,11 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
         "axes that point down turned upwards, since a platform's angles count to the left: steer; angles and "
         "limits have the other sign",
     ),
+    "calibrated": (
+        {"numbers": {"track": [0.5, 0.56], "offset.steering": [0.0, -0.02]}},
+        {},
+        "not as its file says: track 0.56 (file: 0.5), offset.steering -0.02 (file: 0)",
+    ),
     "reference_moved": (
         {"at": [-0.25, 0.0, 0.0], "yaw": 1.5},
         {},

@@ -105,6 +105,10 @@ WORDS = placed(
         "steer, which follow it (Ackermann)",
         "joints_reversed": "axes that point down turned upwards, since a platform's angles count to the "
         "left: {names:few}; angles and limits have the other sign",
+        "calibrated": lambda *, numbers, **_: (
+            "not as its file says: "
+            + few([f"{name} {own:g} (file: {file:g})" for name, (file, own) in numbers.items()])
+        ),
         "reference_moved": _reference_moved,
         "joints_locked": "locked joints: {values:few %s at %g}",
         "mimics_locked": lambda *, values, **_: (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
+import statistics
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -276,7 +277,7 @@ def main_wheels(
 
 
 def common_radius(platform: str, wheels: Sequence[RollingJoint]) -> float:
-    """The wheels' radius, m; `InputError` where none is known."""
+    """The mean of the wheels' radii, m; `InputError` where none is known."""
     known = [wheel.radius for wheel in wheels if not math.isnan(wheel.radius)]
     if not known:
         expected = (
@@ -285,7 +286,7 @@ def common_radius(platform: str, wheels: Sequence[RollingJoint]) -> float:
         raise InputError(
             "no wheel has a shape that tells it", where=f"platform {platform}", expected=expected
         )
-    return known[0]
+    return float(statistics.mean(known))
 
 
 def check_axle(layout: Layout, platform: str) -> None:

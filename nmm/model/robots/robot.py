@@ -22,6 +22,7 @@ from nmm.model.robots.coordinates import Coordinates
 from nmm.model.robots.joint_table import joint_table, own_axes
 from nmm.model.robots.meshes import MeshesWhenAsked, Shapes
 from nmm.model.robots.mimic_joints import MimicJoint
+from nmm.model.robots.readings import Readings
 from nmm.model.robots.semantics import Semantics
 from nmm.model.robots.wheel import Wheel
 
@@ -30,7 +31,7 @@ CENTER_OF_MASS = "<center of mass>"
 
 
 @dataclass(frozen=True, eq=False)
-class Robot(Coordinates):
+class Robot(Coordinates, Readings):
     """A manipulator on a wheeled platform. Made by `nmm.load`; nothing in it changes afterwards.
 
     Attributes
@@ -48,6 +49,8 @@ class Robot(Coordinates):
     arms : the joints of each arm by the arm's name, when several were mounted or one was named
     followers : the mimic joints, each by an independent coordinate; they have no input of their own
     semantics : what its SRDF says
+    nominal : what its file says of the numbers that were changed (`nmm.with_numbers`), by name
+    corrections : by steered joint, ratio (1) and offset (rad): coordinate = ratio * reading + offset
     parts : what loading keeps for mounting and for reports (`nmm.model.robots.loading.provenance.Parts`)
 
     Examples
@@ -77,6 +80,8 @@ class Robot(Coordinates):
     arms: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     mimic_joints: tuple[MimicJoint, ...] = ()
     semantics: Semantics = field(default_factory=Semantics)
+    nominal: Mapping[str, float] = field(default_factory=dict)
+    corrections: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     parts: Any = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -140,12 +145,6 @@ class Robot(Coordinates):
         """Names of the frames that a task may speak of, in the model's order."""
         seen = dict.fromkeys(frame.name for frame in self.model.frames)
         return tuple(name for name in seen if name != "universe")
-
-    @cached_property
-    def reversed_joints(self) -> tuple[str, ...]:
-        """The platform's joints whose axes point down in the file: their coordinates' sign is the other."""
-        reversals = (note.values["names"] for note in self.notes if note.code == "joints_reversed")
-        return tuple(name for names in reversals for name in names)
 
     def frame_id(self, name: str) -> int:
         """Pinocchio's index of a frame; of the link's where a link and a joint share the name."""

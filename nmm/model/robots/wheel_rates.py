@@ -125,6 +125,21 @@ def steered_wheels(robot: Robot) -> dict[str, tuple[str, Callable[[float], float
     return swivels
 
 
+def swivel_readings(robot: Robot, q: Array, q_dot: Array) -> dict[str, tuple[float, float]]:
+    """What encoders of the swivels of `steered_wheels` read at q (n,) and q_dot (n,): angle and rate by
+    joint, rad and rad/s, without the robot's corrections of the steering angle."""
+    rows, read = dict(zip(*wheel_rates(robot), strict=True)), {}
+    for wheel in robot.wheels:
+        if wheel.swivel and wheel.joint in rows:
+            row, (upright, straight) = rows[wheel.joint], _swivel(robot, wheel)
+            steer = int(row[4])
+            ratio, offset = robot.corrections.get(robot.q_names[steer], (1.0, 0.0))
+            cosine, sine, slope = following(row, (q[steer] - offset) / ratio)
+            angle = math.remainder(math.atan2(sine, cosine) - straight, 2.0 * math.pi)
+            read[wheel.swivel] = upright * angle, float(upright * slope * q_dot[steer] / ratio)
+    return read
+
+
 def _swivel(robot: Robot, wheel: Wheel) -> tuple[float, float]:
     """Whether a wheel's swivel turns about what points up, 1 or -1, and its angle where δ is none, rad."""
     model = robot.display_model

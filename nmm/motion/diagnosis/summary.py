@@ -47,6 +47,7 @@ def summarise(trajectory: Trajectory, motors: bool = True) -> dict[str, Any]:
             "source": robot.source,
             "arguments": dict(robot.arguments),
             "fingerprint": robot.fingerprint,
+            **({"numbers": dict(robot.changed_numbers)} if robot.changed_numbers else {}),
         },
         "platform": robot.platform.name,
         "resolver": trajectory.resolver,

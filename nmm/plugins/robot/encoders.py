@@ -32,7 +32,6 @@ class Encoders:
         self.robot, self.where = robot, f"q_from: {robot.name}"
         self.own = robot.q_names[min(3, robot.platform.n_p) :]
         self.renamed = robot.renamed
-        self.signs = dict.fromkeys(robot.reversed_joints, -1.0)
         self.steered = steered_wheels(robot)
         self.passive = {joint for wheel in robot.wheels for joint in wheel.joints}
         self.following = {mimic.joint for mimic in robot.mimic_joints}
@@ -64,9 +63,10 @@ class JointReadings:
     others : those of them that are no joints'
     unmeasured : coordinates that may have no reading; they stay as they are
 
-    A reading of a joint: its place among the readings, its coordinate, and its sign; of wheels that steer
-    together: the coordinate, and each one's place and angle; of mimic joints whose leader has none: where it
-    is written, the leader, multiplier and offset.
+    A reading of a joint: its place among the readings, its coordinate, factor and offset (`Robot.gear`); of
+    wheels that steer together: the coordinate, each one's place and angle, ratio and offset of the angle that
+    they make (`Robot.corrections`); of mimic joints whose leader has none: where it is written, the leader,
+    multiplier and offset.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class JointReadings:
         self.names, self._encoders = names, encoders
         robot, where, own = encoders.robot, encoders.where, encoders.own
         coordinate = {name: robot.n - len(own) + i for i, name in enumerate(own)}
-        direct: dict[str, tuple[int, int, float]] = {}
+        direct: dict[str, tuple[int, int, float, float]] = {}
         steered: dict[str, list[tuple[int, Callable[[float], float]]]] = {}
         self._locked: list[tuple[int, str]] = []
         for place, file_name in enumerate(names):
@@ -87,7 +87,7 @@ class JointReadings:
             if file_name in others:
                 continue
             if name in own:
-                direct[name] = place, coordinate[name], encoders.signs.get(name, 1.0)
+                direct[name] = place, coordinate[name], *robot.gear(name)
             elif name in encoders.steered:
                 by, angle = encoders.steered[name]
                 steered.setdefault(by, []).append((place, angle))
@@ -96,7 +96,11 @@ class JointReadings:
             elif name not in encoders.passive:
                 raise no_such("joint", name, (*own, *sorted(encoders.passive)), where)
         self._direct = [*direct.values()]
-        self._steered = [(coordinate[by], wheels) for by, wheels in steered.items() if by not in direct]
+        self._steered = [
+            (coordinate[by], wheels, *robot.corrections.get(by, (1.0, 0.0)))
+            for by, wheels in steered.items()
+            if by not in direct
+        ]
         known = {*direct, *steered}
         self._leaders = []
         for mimic in robot.mimic_joints:
@@ -114,11 +118,12 @@ class JointReadings:
         robot = self._encoders.robot
         for place, name in self._locked:
             _check_locked(name, values[place], robot.locked[name], self._encoders.where)
-        for place, i, sign in self._direct:
-            q[i] = sign * values[place]
-        for i, wheels in self._steered:
+        for place, i, factor, offset in self._direct:
+            q[i] = factor * values[place] + offset
+        for i, wheels, ratio, offset in self._steered:
             angles = [angle(values[place]) for place, angle in wheels]
-            q[i] = math.atan2(sum(map(math.sin, angles)), sum(map(math.cos, angles)))
+            middle = math.atan2(sum(map(math.sin, angles)), sum(map(math.cos, angles)))
+            q[i] = ratio * middle + offset
         for i, leader, multiplier, offset in self._leaders:
             q[leader] = (float(q[i]) - offset) / multiplier
         if near is not None:

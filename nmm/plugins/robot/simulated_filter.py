@@ -72,8 +72,7 @@ class SimulatedFilter:
         """Of all encoders at first: the inputs', and the joints' with the file's signs."""
         robot = self._robot
         names = robot.q_names[3:]
-        signs = dict.fromkeys(robot.reversed_joints, -1.0)
-        joints = {name: signs.get(name, 1.0) * float(q[robot.coordinate(name)]) for name in names}
+        joints = {name: robot.reading(name, float(q[robot.coordinate(name)])) for name in names}
         return {robot.platform.inputs[i]: 0.0 for i in self._counted} | joints
 
     def go_on(self, q: Array, ahead: Array, by: Array, dt: float) -> Array:

@@ -84,8 +84,8 @@ def first_scenario(
     file : where the text will stand: paths below that folder are relative; the working folder when not given
     obstacles : files of what the robot keeps 3 cm away from: clouds (.ply, .pcd, .npz), maps (.yaml), cells
         of OctoMap's (.bt); each where its numbers have it
-    loading : platform, lock, axle, package_dirs, srdf, arguments as `nmm.load` takes them; lock and srdf are
-        the arm's where there is one
+    loading : platform, lock, axle, package_dirs, srdf, calibration, arguments as `nmm.load` takes them; lock
+        and srdf are the arm's where there is one
 
     Raises
     ------

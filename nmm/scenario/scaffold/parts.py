@@ -84,8 +84,9 @@ def _mounted(base: Mapping[str, Any], arm: Mapping[str, Any], at: str | None) ->
 
 def _part(source: str, folder: Path, keys: Mapping[str, Any]) -> dict[str, Any]:
     part: dict[str, Any] = {"source": written_path(source, folder), **keys}
-    if "srdf" in part:
-        part["srdf"] = written_path(str(part["srdf"]), folder)
+    for key in ("srdf", "calibration"):
+        if key in part:
+            part[key] = written_path(str(part[key]), folder)
     if "package_dirs" in part:
         named = [named_folder(str(entry)) for entry in part["package_dirs"]]
         part["package_dirs"] = [

@@ -20,6 +20,7 @@ from nmm.model.collisions.obstacle import (
     obstacle_places,
     shape_from_json,
 )
+from nmm.model.robots.numbers import with_numbers
 from nmm.motion.components import components
 from nmm.motion.diagnosis.summary import FORMAT
 from nmm.motion.residuals import Residuals
@@ -115,7 +116,7 @@ def _loaded(folder: Path, robot: Robot | None) -> Trajectory:
     absent = {quantity.name: None if quantity.optional else quantity.absent(**sizes) for quantity in saved()}
     arrays = {name: npz.get(name, fill) for name, fill in absent.items()}
     obstacles = _obstacles(stored.obstacles or (), npz, file)
-    scenario, rest = None, dict[str, Any]()
+    scenario, rest, given = None, dict[str, Any](), robot is not None
     if (folder / "scenario.yaml").exists():
         loaded = Scenario.load(folder / "scenario.yaml")
         scenario = loaded.resolved()
@@ -128,6 +129,8 @@ def _loaded(folder: Path, robot: Robot | None) -> Trajectory:
             robot = load_robot(stored.robot.source, arguments=stored.robot.arguments)
         except RobotError as error:
             raise InputError(f"its robot cannot be loaded ({_ASK}): {error}", where=folder) from None
+    if not given:
+        robot = _numbered(robot, stored.robot.numbers, summary)
     same = stored.robot.fingerprint in (None, robot.fingerprint)
     if not same or (npz["q"].shape[1], npz["u"].shape[1]) != (robot.n, robot.n_u):
         raise InputError(f"{robot.name} is another robot than the run's ({_ASK})", where=folder)
@@ -151,6 +154,16 @@ def _loaded(folder: Path, robot: Robot | None) -> Trajectory:
         "cameras": _cameras(stored, arrays, summary),
     }
     return Trajectory.of(arrays, **rest)
+
+
+def _numbered(robot: Robot, numbers: Mapping[str, float], summary: Path) -> Robot:
+    """The robot with the numbers that it ran with, whatever its file of calibration says by now."""
+    if robot.changed_numbers == numbers:
+        return robot
+    try:
+        return with_numbers(with_numbers(robot, robot.nominal), numbers)
+    except InputError as error:
+        raise error.at(f"{summary}: robot.numbers") from None
 
 
 def _cameras(stored: ToldRun, arrays: Mapping[str, Any], summary: Path) -> tuple[RunCamera, ...]:

@@ -37,6 +37,7 @@ class ToldRobot(Told):
     source: str
     arguments: dict[str, str]
     fingerprint: str | None = None
+    numbers: dict[str, FiniteFloat] = {}
 
 
 class ToldEvent(Told):
@@ -120,6 +121,7 @@ class ToldComparison(ToldFormat):
 
 
 Kind = TypeVar("Kind", bound=Told)
+Model = TypeVar("Model", bound=BaseModel)
 
 
 def read_checked(path: Path, kind: type[Kind], format_: str) -> Kind:
@@ -134,7 +136,14 @@ def read_checked(path: Path, kind: type[Kind], format_: str) -> Kind:
     return _checked(path, content, kind)
 
 
-def _checked(path: Path, content: bytes, kind: type[Kind]) -> Kind:
+def read_json(path: Path, kind: type[Model]) -> Model:
+    """As `read_checked`, of a file that states no format of nmm's."""
+    with _reading(path):
+        content = read_bytes(path, MOST)
+    return _checked(path, content, kind)
+
+
+def _checked(path: Path, content: bytes, kind: type[Model]) -> Model:
     try:
         return kind.model_validate_json(content)
     except ValidationError as error:

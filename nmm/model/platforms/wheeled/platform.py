@@ -98,6 +98,7 @@ class WheeledPlatform(Platform):
     ) -> None:
         self.wheels = tuple(wheels)
         self.hitches = tuple(hitches)
+        self._asked = inputs
         for part, kind in [(w, WheelDescription) for w in self.wheels] + [(h, Hitch) for h in self.hitches]:
             of_kind = isinstance(part, kind) and type(part) is not WheelDescription
             expect(of_kind, self.name, "wheels of a kind, and hitches", part)
@@ -127,6 +128,10 @@ class WheeledPlatform(Platform):
                     where=layout.robot,
                 )
         return platform
+
+    def with_parts(self, wheels: Sequence[WheelDescription], hitches: Sequence[Hitch]) -> Self:
+        """The same platform with other wheels and hitches of the same names."""
+        return type(self)(wheels, hitches, self._asked, limits=self._limits)
 
     @property
     def lengths(self) -> Mapping[str, float]:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from nmm.base.errors import RobotError, expect_kind, one_or_several
+from nmm.base.lazy_call import lazy_call
 from nmm.base.trust import trusting
 from nmm.model.platforms import Platform, platform_by_name
 from nmm.model.robots.loading.draft import LoadOptions
@@ -44,6 +45,7 @@ def load(
     visual_model: pin.GeometryModel | None = None,
     collision_model: pin.GeometryModel | None = None,
     srdf: str | Path | None = None,
+    calibration: Any = None,
     trust: bool = False,
 ) -> Robot:
     """Load a mobile manipulator, or an arm that is put on a platform.
@@ -83,6 +85,8 @@ def load(
     srdf : a file of postures, groups, joints without a motor and pairs of links that may touch (a xacro file
         gets `arguments`); by default the one beside the file or in ../srdf that has the file's name or the
         robot's
+    calibration : what was learned of this very robot: a calibration.yaml, or a `CalibrationFile`; its wheels,
+        lengths and steered joints are as measured then (`nmm.with_numbers`)
     trust : whether xacro files may run any Python, and read environment variables and files outside the
         robot's folder and packages; without, they are refused where they would
 
@@ -94,7 +98,8 @@ def load(
     Raises
     ------
     RobotError : unknown name, missing or malformed file; one line with the file and every cause
-    InputError : the platform is none, or does not have the robot's coordinates
+    InputError : the platform is none, or does not have the robot's coordinates; a calibration of another
+        robot, by the number that differs
 
     Examples
     --------
@@ -117,6 +122,8 @@ def load(
             raise RobotError(where=argument, expected=expected, got=value)
     if isinstance(srdf, str) and srdf.startswith(PACKAGE):
         srdf = package_file(srdf, folders)
+    if isinstance(calibration, str) and calibration.startswith(PACKAGE):
+        calibration = package_file(calibration, folders)
     options = LoadOptions(
         platform,
         wheels,
@@ -131,13 +138,21 @@ def load(
             raise RobotError("they are for files, not for a pin.Model", where="arguments, package_dirs")
         model = read_model(source, visual_model, collision_model)
         with trusting(trust):
-            return _with_srdf(model, options, srdf, None, folders)
+            return _calibrated(_with_srdf(model, options, srdf, None, folders), calibration)
     if visual_model is not None or collision_model is not None:
         what = "they are for a pin.Model: a file holds its own shapes"
         raise RobotError(what, where="visual_model, collision_model")
     with trusting(trust):
         read = read_file(source, arguments, folders, options.lock, missing_meshes)
-        return _with_srdf(read, options, srdf, source_path(source, folders), folders)
+        robot = _with_srdf(read, options, srdf, source_path(source, folders), folders)
+        return _calibrated(robot, calibration)
+
+
+def _calibrated(robot: Robot, calibration: object) -> Robot:
+    if calibration is None:
+        return robot
+    calibrated: Robot = lazy_call("nmm.scenario.calibration_file:calibrated")(robot, calibration)
+    return calibrated
 
 
 def _with_srdf(

@@ -23,6 +23,7 @@ from nmm.model.robots.loading.locking import add_pairs, told_apart
 from nmm.model.robots.loading.passes import robot_from
 from nmm.model.robots.loading.provenance import loaded_parts, with_wheels_fixed
 from nmm.model.robots.loading.source import Source
+from nmm.model.robots.numbers import with_numbers, without_changes
 from nmm.model.robots.robot import Robot, frame_index
 
 _PLACES = ("mount", "arm_mount", "top")
@@ -73,7 +74,8 @@ def mount(
         raise RobotError(where="name", expected="a string", got=name)
     base = platform if isinstance(platform, Robot) else load(platform)
     other = arm if isinstance(arm, Robot) else _loaded_arm(arm)
-    return _mounted(base, other, at, _pose(placement), prefix, name)
+    mounted = _mounted(without_changes(base), other, at, _pose(placement), prefix, name)
+    return with_numbers(mounted, base.changed_numbers)
 
 
 @dataclass(frozen=True, eq=False)

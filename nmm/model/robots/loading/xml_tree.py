@@ -1,9 +1,12 @@
 """Files read into XML elements that know their line; no entity is expanded."""
 
 import math
+import os
 import re
 import sys
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
@@ -44,11 +47,41 @@ class XmlError(Exception):
         super().__init__(str(self.finding))
 
 
+class Tried:
+    """Contents in the place of those of files, by their real paths; `read` : the files that were read."""
+
+    def __init__(self, contents: Mapping[Path, bytes]) -> None:
+        self.contents, self.read = dict(contents), list[Path]()
+
+
+_TRIED: ContextVar[Tried | None] = ContextVar("tried", default=None)
+
+
+@contextmanager
+def trying(contents: Mapping[Path, bytes]) -> Iterator[Tried]:
+    """In the block, files are read as if they had these contents: what a change would make of a robot."""
+    tried = Tried({Path(os.path.realpath(path)): content for path, content in contents.items()})
+    token = _TRIED.set(tried)
+    try:
+        yield tried
+    finally:
+        _TRIED.reset(token)
+
+
+def _content(path: Path) -> bytes:
+    tried = _TRIED.get()
+    if tried is None:
+        return read_bytes(path, LONGEST)
+    real = Path(os.path.realpath(path))
+    tried.read.append(real)
+    return tried.contents[real] if real in tried.contents else read_bytes(path, LONGEST)
+
+
 def read_text(path: Path) -> str:
     """The text of a UTF-8 file, which starts with its XML declaration, if any; `RobotError` if it cannot be
     read, FileNotFoundError if it is not there."""
     try:
-        content = read_bytes(path, LONGEST)
+        content = _content(path)
         # Behind the declaration the white space keeps the lines' numbers.
         return _LATE.sub(r"\2\1", content.decode("utf-8-sig"))
     except FileNotFoundError:

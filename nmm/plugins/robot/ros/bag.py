@@ -87,8 +87,28 @@ def read_bag(
         motion = _RecordedMotion(Recorded(robot, file, names))
     except InputError as error:
         raise (error if str(file) in error.where else error.at(file)) from None
-    times, q, u = motion.times, motion.q, motion.u
-    t = (times - times[0]) / 1e9
+    t = (motion.times - motion.times[0]) / 1e9
+    for finding in motion.findings:
+        warnings.warn(f"{file.name}: {finding}", RuntimeWarning, stacklevel=2)
+    return as_trajectory(
+        robot, t, motion.q, motion.u, motion.findings, believed=motion.believed, frame=frame, label=file.stem,
+        resolver="bag",
+    )  # fmt: skip
+
+
+def as_trajectory(
+    robot: Robot,
+    t: Array,
+    q: Array,
+    u: Array,
+    findings: Sequence[Finding],
+    *,
+    frame: str | None,
+    label: str,
+    resolver: str,
+    believed: Array | None = None,
+) -> Trajectory:
+    """A trajectory of what was recorded: times (N,), s, q (N, n), u (N, n_u); without a task."""
     count = len(t)
     q_dot = np.einsum("kij,kj->ki", velocity_maps(robot, q), u)
     place = None
@@ -96,20 +116,18 @@ def read_bag(
         place = np.array([Configuration(robot, at).placement(frame).translation for at in q])
     sizes = {"N": count, "n": robot.n, "m": robot.n_u}
     arrays = {quantity.name: quantity.absent(**sizes) for quantity in saved() if not quantity.optional}
-    arrays |= {"t": t, "q": q, "u": u, "q_dot": q_dot, "path": place, "believed": motion.believed}
-    for finding in motion.findings:
-        warnings.warn(f"{file.name}: {finding}", RuntimeWarning, stacklevel=2)
+    arrays |= {"t": t, "q": q, "u": u, "q_dot": q_dot, "path": place, "believed": believed}
     return Trajectory.of(
         arrays,
         robot=robot,
         r_names=(),
         r_units=(),
-        resolver="bag",
+        resolver=resolver,
         method="recorded",
         dt=float(np.median(np.diff(t))) if count > 1 else 0.0,
-        verdict=Verdict().after(motion.findings),
+        verdict=Verdict().after(findings),
         frame=frame,
-        label=file.stem,
+        label=label,
     )
 
 
@@ -216,8 +234,7 @@ class _RecordedMotion:
                     zero = not np.any(velocity.rows)
                     contradicted.setdefault(zero, []).append(name)
                 else:
-                    sign = -1.0 if name in robot.reversed_joints else 1.0
-                    q_dot[:, i] = sign * velocity.between(times)[:, 0]
+                    q_dot[:, i] = robot.gear(name)[0] * velocity.between(times)[:, 0]
         if world is not None:
             q_dot[:, :3] = self._platform_rates(counted or world, t, contradicted)
         self.findings += [

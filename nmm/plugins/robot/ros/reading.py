@@ -244,8 +244,7 @@ def inputs(robot: Robot, q: ArrayLike, velocity: ArrayLike, joint_rates: Mapping
     first = min(3, robot.platform.n_p)
     for i, name in enumerate(robot.q_names[first:], first):
         if name in joint_rates:
-            sign = -1.0 if name in robot.reversed_joints else 1.0
-            q_dot[i] = sign * float(joint_rates[name])
+            q_dot[i] = robot.gear(name)[0] * float(joint_rates[name])
         elif i >= robot.platform.n_p and i in robot.following.independent:
             raise InputError(f"no rate of {name}", where=f"inputs: {robot.name}")
     known = np.array([i < first or name in joint_rates for i, name in enumerate(robot.q_names)])

@@ -21,7 +21,8 @@ AHEAD = 10_000_000_000
 class Route:
     """A way from a frame to the platform's reference point, which moves along it.
 
-    carrier : the edge that carries its motion; those before it correct it. None where nothing can move
+    carrier : the edge that carries its motion; None where nothing can move
+    corrects : the edges before it, which correct it
     """
 
     def __init__(self, way: Way, tail: Array, odom: str, twists: Track) -> None:
@@ -32,7 +33,7 @@ class Route:
         own = [edge for edge, _ in way[below[0] :] if not edge.static] if below else []
         moving = [edge for edge in free if not edge.constant]
         self.carrier = next(iter(own or moving[-1:] or free[-1:]), None)
-        self._corrects = free[: free.index(self.carrier)] if self.carrier is not None else []
+        self.corrects = free[: free.index(self.carrier)] if self.carrier is not None else []
 
     def span(self) -> tuple[float, float]:
         """From when to when it is known, ns: what does not change, always; what is dated ahead, from when it
@@ -42,15 +43,15 @@ class Route:
             if edge is self.carrier or not edge.constant:
                 times, track = edge.poses[0], edge.track
                 ahead = 0 if track.by_recording else int(times[0]) - min(track.recorded)
-                early = ahead if edge in self._corrects and 0 < ahead < AHEAD else 0
-                late = np.diff(times).max() if edge in self._corrects and len(times) > 1 else 0
+                early = ahead if edge in self.corrects and 0 < ahead < AHEAD else 0
+                late = np.diff(times).max() if edge in self.corrects and len(times) > 1 else 0
                 first, last = max(first, times[0] - early), min(last, times[-1] + late)
         return first, last
 
     @cached_property
     def _jumps(self) -> dict[Edge, Flags]:
         flags = {
-            edge: jumps_of(*edge.poses, edge in self._corrects) for edge, _ in self.way if not edge.static
+            edge: jumps_of(*edge.poses, edge in self.corrects) for edge, _ in self.way if not edge.static
         }
         if self.carrier in flags and len(self._twists):  # a robot may be as fast as it says
             times = self.carrier.poses[0]
