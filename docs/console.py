@@ -8,7 +8,7 @@ A page's blocks run in order, in one empty folder:
   its "$ nmm …"; scripts have tests of their own.
 - ```bash: lines "nmm …" run, without what they print. What waits for Ctrl-C (view, drive, --play, …) gets it
   when its page is open.
-- a file beside the page to which it links, "](NAME.py)", is copied there first.
+- a file in tutorials/ to which it links, "](NAME.py)", is copied there first.
 - a block of any language whose first line is "# NAME" or "<!-- NAME -->" is the file NAME.
 - ```python else runs as it stands, with the names of the page's blocks before it.
 
@@ -35,12 +35,13 @@ from typing import TextIO
 FOLDER = Path(__file__).parent
 TUTORIALS = sorted((FOLDER / "tutorials").glob("*.md"))
 #: Pages whose blocks run.
-PAGES = (*(FOLDER / f"{name}.md" for name in ("singularities", "sweeps", "papers")), *TUTORIALS)
+_OTHERS = ("singularities", "sweeps", "papers", "calibration")
+PAGES = (*(FOLDER / f"{name}.md" for name in _OTHERS), *TUTORIALS)
 COMPARED = "console"
 
 _BLOCK = re.compile(r"^```(?P<kind>\w+)\n(?P<body>.*?)^```$", re.DOTALL | re.MULTILINE)
 _NAMED = re.compile(r"(?:# |<!-- )(?P<name>[\w-]+\.\w+)(?: -->)?\n")
-_LINKED = re.compile(r"\]\(([\w-]+\.(?:py|urdf))\)")
+_LINKED = re.compile(r"\]\((?:tutorials/)?([\w-]+\.(?:py|urdf))\)")
 _PROMPT = "$ "
 _STAYS = ("view", "drive", "play")
 _PATIENCE = 120.0

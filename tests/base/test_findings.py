@@ -22,6 +22,8 @@ from nmm.motion.diagnosis.judgement import Trials
 from nmm.motion.verdict import Awaited
 from nmm.plugins.robot import bag_findings as bag
 from nmm.plugins.robot import findings as loop
+from nmm.plugins.robot.calibration import findings as calibrating
+from nmm.plugins.robot.calibration import log_findings
 
 PART = {"name": "q1", "t": 0.5, "value": 1.25, "unit": "rad", "lower": -1.0, "upper": 1.0}
 FLAW = {"meaning": "the task Jacobian J lost rank", "lost": ["tilt of tool about x"], "level": None}
@@ -758,4 +760,6 @@ def test_every_code_is_documented(pytestconfig: pytest.Config) -> None:
         *run.WORDS,
         *loop.WORDS,
         *bag.WORDS,
+        *calibrating.WORDS,
+        *log_findings.WORDS,
     }

@@ -1,0 +1,89 @@
+"""What is doubtful in a calibration, as findings."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from nmm.base.findings import Finding
+from nmm.plugins.robot.calibration.fit import Fit
+from nmm.plugins.robot.calibration.innovations import BEGINS, LEFT_OUT
+from nmm.plugins.robot.calibration.judged import CHANCE, HeldOut
+from nmm.plugins.robot.calibration.model import Model
+from nmm.plugins.robot.calibration.parameters import CLOCK
+
+#: Delays of drives that differ by more, s, are told; a number that is so many times as far from the file's as
+#: is plausible.
+UNEVEN, FAR = 0.1, 2.0
+#: A clock that runs apart by less over the drive, s, is none that does.
+APART = 0.005
+
+
+def of_numbers(model: Model, fitted: Fit) -> list[Finding]:
+    far = [
+        Finding(
+            "far_from_file",
+            {"name": number.name, "value": float(value), "before": number.value, "unit": number.unit},
+        )
+        for number, value, scale in zip(model.learned, fitted.values, model.scales, strict=True)
+        if number.of_robot and abs(value - number.value) > FAR * scale
+    ]
+    scales = [model.learned[i].name for i in fitted.free if model.learned[i].kind == "scale"]
+    if scales:
+        far.append(Finding("of_the_log", {"names": scales}))
+    return far + [
+        Finding(
+            "not_shown",
+            {
+                "name": model.learned[i].name,
+                "value": float(fitted.values[i]),
+                "unit": model.learned[i].unit,
+                "others": [model.learned[j].name for j in others],
+                "motion": model.learned[i].shown_by,
+            },
+        )
+        for i, others in fitted.unseen.items()
+        if model.learned[i].kind != CLOCK
+    ]
+
+
+def of_drives(model: Model, delays: Sequence[float], held: Collection[int]) -> list[Finding]:
+    lengths = [i for i, number in enumerate(model.learned) if number.unit == "m"]
+    findings = [Finding("scale_held")] if model.closed and not any(i in held for i in lengths) else []
+    if delays and max(delays) - min(delays) > UNEVEN:
+        findings.append(Finding("delays_differ", {"least": min(delays), "most": max(delays)}))
+    for drive in model.drives:
+        if drive.gaps:
+            findings.append(Finding("counters_silent", {"log": drive.name, "count": drive.gaps}))
+        if drive.every > 1:
+            values = {"log": drive.name, "every": drive.every, "count": len(drive.at)}
+            findings.append(Finding("looks_thinned", values))
+        lost = np.flatnonzero(drive.taken == LEFT_OUT)
+        if len(lost):
+            values = {"log": drive.name, "count": len(lost), "all": len(drive.at)}
+            findings.append(Finding("looks_left_out", values, {"t": float(drive.at[lost[0]])}))
+        jumps = np.flatnonzero(drive.taken == BEGINS)[1:]
+        if len(jumps) > drive.gaps:
+            values = {"log": drive.name, "count": len(jumps) - drive.gaps}
+            findings.append(Finding("reference_jumped", values, {"t": float(drive.at[jumps[0]])}))
+    return findings
+
+
+def of_rest(model: Model, fitted: Fit, predicted: HeldOut | None, white: float) -> list[Finding]:
+    findings = []
+    if white < CHANCE:
+        findings.append(Finding("not_white", {"p": white}))
+    if predicted is None:
+        findings.append(Finding("no_held_out"))
+    elif predicted.verdict != "better":
+        values = predicted._asdict() | {"verdict": predicted.verdict}
+        findings.append(Finding("not_better", values))
+    clock = model.index(CLOCK)
+    if clock in fitted.free:
+        rate = float(fitted.values[clock])
+        apart = abs(rate) * max(float(drive.at[-1] - drive.at[0]) for drive in model.drives)
+        if abs(rate) > 4.0 * fitted.deviations[fitted.free.index(clock)] and apart > APART:
+            values = {"rate": abs(rate) * 6e4, "faster": rate > 0.0, "apart": 1e3 * apart}
+            findings.append(Finding("clocks_apart", values))
+    return findings

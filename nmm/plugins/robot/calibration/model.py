@@ -1,0 +1,347 @@
+"""A robot's numbers beside its drives: innovations of the reference, with their slopes in the numbers."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from nmm.base.arrays import Array
+from nmm.base.kernels.compiled import checked_by_caller
+from nmm.model.robots.numbers import robot_numbers, with_numbers
+from nmm.model.robots.robot import Robot
+from nmm.plugins.robot.calibration.drives import RobotDrive, path
+from nmm.plugins.robot.calibration.innovations import BEGINS, INNOVATIONS, TAKEN, innovations
+from nmm.plugins.robot.calibration.parameters import CLOCK, DELAY, MOUNT, Learned, learned
+from nmm.plugins.robot.calibration.planar import along_body, composed, placed
+from nmm.plugins.robot.calibration.stretches import Stretches, steps_between, stretches
+from nmm.plugins.robot.counted_motion import Counted
+from nmm.plugins.robot.odometry import Counters
+
+#: For differences, as a part of what is plausible.
+_STEP = 1e-3
+#: Drives that end so near to where they began, as a share of their way, tell no scale.
+CLOSED = 0.05
+#: A drive's first heading is that of so many m of positions, or of thirty times their noise.
+SEEN = 2.0
+
+
+class DriveNoise(NamedTuple):
+    """Standard deviations: of the reference's place, m, and heading, rad; of each counter for a rad (or m) of
+    it, rad; across for a metre of the way, m; of the turn for a rad of it, rad; of how counters that are more
+    than inputs agree, for a rad (or m) of them, rad; of how hitches follow from look to look, rad; of the
+    times of looks beside the counters', s.
+
+    Examples
+    --------
+    >>> nmm.extending.DriveNoise(0.003, 0.003, 0.01, 1e-4, 2e-3, 2e-3, 1e-4, 1e-3).place
+    0.003
+    """
+
+    place: float
+    heading: float
+    counters: float
+    across: float
+    turns: float
+    agreement: float
+    following: float
+    jitter: float
+
+
+class Slopes(NamedTuple):
+    """Of a drive's stretches in f numbers: of their ends (M - 1, 3, f), of what is spare (M - 1, k, f) and
+    of what is astray (M - 1, n_p - 3, f)."""
+
+    ends: Array
+    spare: Array
+    astray: Array
+
+
+class SideRows(NamedTuple):
+    """What is known beside the reference, over its deviation: (R,), with slopes (R, f); the sum of the
+    variances' logarithms; how many of the numbers are free."""
+
+    over: Array
+    slopes: Array
+    logarithms: float
+    free: int
+
+
+Made = tuple[Stretches, Slopes]
+
+
+@dataclass(eq=False)
+class Filtered:
+    """Of a drive: w (M, r) and W (M, r, n), S (M, r), poses (M, 3) as `innovations` tells; the rows taken;
+    what counters say beyond motions, and how hitches follow."""
+
+    w: Array
+    W: Array
+    S: Array
+    poses: Array
+    taken: Array
+    agreement: SideRows
+    following: SideRows
+
+    @property
+    def log_likelihood(self) -> float:
+        w, S = self.w[self.taken], self.S[self.taken]
+        total = np.sum(w * w + np.log(S))
+        for part in (self.agreement, self.following):
+            total += part.over @ part.over + part.logarithms
+        return float(-0.5 * total)
+
+    @property
+    def count(self) -> int:
+        """How many numbers are free to be off."""
+        looks = int(np.count_nonzero(self.taken)) * self.w.shape[1]
+        return looks + self.agreement.free + self.following.free
+
+
+class Model:
+    """What may be learned of a robot by some drives.
+
+    learned : the numbers, in order; `first` (n,) : their values at first
+    """
+
+    def __init__(self, robot: Robot, counters: Counters, drives: Sequence[RobotDrive], delay: float) -> None:
+        self.robot, self.counters, self.drives = robot, counters, [*drives]
+        self.learned = _learnable(robot, counters, self.drives, delay)
+        self.first = np.array([number.value for number in self.learned])
+        self.scales = np.array([number.plausible for number in self.learned])
+        self._own_names = {*robot_numbers(robot)}
+        self._records: dict[tuple[float, ...], Counted] = {}
+        self._filter = checked_by_caller(innovations, INNOVATIONS)
+
+    @property
+    def closed(self) -> bool:
+        """Whether all that is known is that drives end about where they began, beside how far they went: all
+        lengths may be larger then."""
+        return all(drive.ends and self._apart(drive) < CLOSED for drive in self.drives)
+
+    def _apart(self, drive: RobotDrive) -> float:
+        """How far a drive's last look is from the first, as a share of its way."""
+        way = float(path(self.counters, drive, drive.t[-1:])[0, 0])
+        return float(np.hypot(*(drive.z[-1, :2] - drive.z[0, :2]))) / max(way, 1e-9)
+
+    @property
+    def free_inputs(self) -> int:
+        """How many inputs counters say; those of steering are measured."""
+        return self.robot.platform.p - len(self.counters.steered)
+
+    def index(self, name: str) -> int:
+        """The place of a number among all; -1 without it."""
+        return next((i for i, number in enumerate(self.learned) if number.name == name), -1)
+
+    def mount(self, values: Array) -> Array:
+        """Where the reference is on the robot (3,), m and rad."""
+        where = [self.index(name) for name in MOUNT]
+        return np.array([values[i] if i >= 0 else 0.0 for i in where])
+
+    def parts(self, first: float, last: float) -> Model:
+        """The model of the looks between two shares of each drive; of drives of which only the ends are known
+        of all."""
+        some = self.drives if all(drive.ends for drive in self.drives) else self.with_looks
+        return self.of([drive if drive.ends else drive.within(first, last) for drive in some])
+
+    def of(self, drives: Sequence[RobotDrive]) -> Model:
+        """The model of other drives."""
+        made = copy.copy(self)
+        made.drives = [*drives]
+        return made
+
+    @property
+    def with_looks(self) -> list[RobotDrive]:
+        """The drives with more than ends."""
+        return [drive for drive in self.drives if not drive.ends]
+
+    def numbers(self, values: Array) -> dict[str, float]:
+        """Those of the robot, by name."""
+        return {
+            number.name: value
+            for number, value in zip(self.learned, values.tolist(), strict=True)
+            if number.name in self._own_names
+        }
+
+    def _record(self, values: Array) -> Counted:
+        """What the step of odometry reads, for these numbers; steering is read by those that `_moved`
+        takes."""
+        numbers = {
+            name: value
+            for name, value in self.numbers(values).items()
+            if not name.startswith(("offset.", "ratio."))
+        }
+        key = tuple(numbers.values())
+        if key not in self._records:
+            if len(self._records) > 50:
+                self._records.clear()
+            robot = with_numbers(self.robot, numbers)
+            names = dict.fromkeys(self.counters.names, 0.0)
+            self._records[key] = Counters(robot, names, self.counters.where).record
+        return self._records[key]
+
+    def _moved(self, values: Array, drive: RobotDrive) -> Stretches:
+        """The stretches of a drive by these numbers."""
+        counts, own, at = drive.counts, drive.own, drive.at
+        for number, value in zip(self.learned, values.tolist(), strict=True):
+            kind, _, name = number.name.partition(".")
+            if kind == "scale":
+                counts = _scaled(counts, self.counters.names.index(name), value, 0.0)
+            elif kind == "ratio":
+                offset = float(values[self.index(f"offset.{name}")])
+                own = _scaled(own, self.robot.coordinate(name) - 3, value, offset)
+            elif kind == DELAY and not drive.ends:
+                at = at - value
+            elif kind == CLOCK and not drive.ends:
+                at = at - value * (drive.at - drive.middle)
+        return stretches(self._record(values), drive.t, counts, own, at, steps_between(drive.at))
+
+    def stretched(self, values: Array, free: Sequence[int]) -> list[Made]:
+        """Of each drive its stretches, and their slopes in the free numbers."""
+        return [self._with_slopes(values, free, drive) for drive in self.drives]
+
+    def _with_slopes(self, values: Array, free: Sequence[int], drive: RobotDrive) -> Made:
+        made = self._moved(values, drive)
+        many, k = made.spare.shape
+        slopes = Slopes(
+            np.zeros((many, 3, len(free))),
+            np.zeros((many, k, len(free))),
+            np.zeros((many, drive.own.shape[1], len(free))),
+        )
+        for column, i in enumerate(free):
+            number = self.learned[i]
+            if number.kind in ("radius", "scale") and not drive.hitches:
+                place = self.counters.names.index(number.name.partition(".")[2])
+                slopes.ends[:, :, column] = made.slopes[:, :, place] / values[i]
+                slopes.spare[:, :, column] = made.spare_slopes[:, :, place] / values[i]
+            elif number.name not in MOUNT:
+                step, ahead = _STEP * number.plausible, values.copy()
+                ahead[i] += step
+                other = self._moved(ahead, drive)
+                ends = along_body(made.motions[:, 2], other.motions - made.motions)
+                slopes.ends[:, :, column] = ends / step
+                slopes.spare[:, :, column] = (other.spare - made.spare) / step
+                slopes.astray[:, :, column] = (other.astray - made.astray) / step
+        return made, slopes
+
+    def filtered(
+        self, values: Array, free: Sequence[int], made: Sequence[Made], noise: DriveNoise
+    ) -> list[Filtered]:
+        """The innovations of each drive."""
+        return [
+            self._filtered(values, free, drive, motions, slopes, noise)
+            for drive, (motions, slopes) in zip(self.drives, made, strict=True)
+        ]
+
+    def _filtered(
+        self,
+        values: Array,
+        free: Sequence[int],
+        drive: RobotDrive,
+        made: Stretches,
+        slopes: Slopes,
+        noise: DriveNoise,
+    ) -> Filtered:
+        where, mount = [self.index(name) for name in MOUNT], self.mount(values)
+        if drive.ends:  # these are of the robot itself
+            where, mount = [-1, -1, -1], np.zeros(3)
+        elif drive.rows == 2:  # the heading where it begins is the body's
+            where[2], mount[2] = -1, 0.0
+        columns = np.array([free.index(i) if i >= 0 and i in free else -1 for i in where], dtype=np.int64)
+        ends = slopes.ends if slopes.ends.shape[2] else np.zeros((len(made.motions), 3, 1))
+        many, r = len(drive.at), drive.rows
+        variances = np.array([noise.counters, noise.across, noise.turns]) ** 2
+        Q = np.tensordot(made.noise, variances, axes=([1], [0]))
+        z = drive.z if r == 3 else _with_headings(drive, made, mount, max(SEEN, 30.0 * noise.place))
+        R = np.array([noise.place**2, noise.place**2, noise.heading**2 if r == 3 else 1.0])
+        R = R + (noise.jitter * _speeds(drive, made)) ** 2
+        result = Filtered(
+            np.zeros((many, r)),
+            np.zeros((many, r, ends.shape[2])),
+            np.zeros((many, r)),
+            np.zeros((many, 3)),
+            drive.taken == TAKEN,
+            self._agreement(made, slopes, noise),
+            _following(drive, made, slopes, noise),
+        )
+        arrays = [np.ascontiguousarray(array) for array in (made.motions, ends, Q, z)]
+        self._filter(*arrays, drive.taken, R, mount, columns, result.w, result.S, result.W, result.poses)
+        return result
+
+    def _agreement(self, made: Stretches, slopes: Slopes, noise: DriveNoise) -> SideRows:
+        """What counters say beyond motions, where they went, over the deviation that their noise gives it."""
+        k, free = made.spare.shape[1], self.free_inputs
+        went = made.counted.mean(axis=1)
+        moved = went > 0.0
+        if k <= free or not np.any(moved):
+            return SideRows(np.zeros(0), np.zeros((0, slopes.spare.shape[2])), 0.0, 0)
+        deviation = noise.agreement * np.sqrt(went[moved])[:, np.newaxis]
+        over = (made.spare[moved] / deviation).ravel()
+        rows = (slopes.spare[moved] / deviation[:, :, np.newaxis]).reshape(len(over), -1)
+        logarithms = 2.0 * (k - free) * float(np.sum(np.log(deviation)))
+        return SideRows(over, rows, logarithms, (k - free) * len(deviation))
+
+
+def _speeds(drive: RobotDrive, made: Stretches) -> Array:
+    """How fast a robot goes and turns at looks (M, 3), along the body's axes, m/s and rad/s."""
+    if drive.ends:
+        return np.zeros((len(drive.at), 3))
+    speeds = made.motions / np.diff(drive.at)[:, np.newaxis]
+    return np.concatenate([speeds[:1], 0.5 * (speeds[1:] + speeds[:-1]), speeds[-1:]])
+
+
+def _following(drive: RobotDrive, made: Stretches, slopes: Slopes, noise: DriveNoise) -> SideRows:
+    """How far hitches turned otherwise than they follow, over the deviation of it."""
+    over = made.astray[:, drive.hitches].ravel() / noise.following
+    rows = slopes.astray[:, drive.hitches].reshape(len(over), slopes.astray.shape[2]) / noise.following
+    return SideRows(over, rows, 2.0 * len(over) * math.log(noise.following), len(over))
+
+
+def _with_headings(drive: RobotDrive, made: Stretches, mount: Array, far: float) -> Array:
+    """z with a heading where a drive begins: that which lays the next `far` m by wheels along the places."""
+    z = drive.z.copy()
+    begins = np.flatnonzero(drive.taken == BEGINS)
+    for first, last in zip(begins, [*begins[1:], len(z)], strict=True):
+        z[first, 2] = _alignment(drive.z[first:last, :2], made.motions[first : last - 1], mount, far)
+    return z
+
+
+def _scaled(table: Array, column: int, by: float, more: float) -> Array:
+    made = table.copy()
+    made[:, column] = by * made[:, column] + more
+    return made
+
+
+def _alignment(places: Array, motions: Array, mount: Array, far: float) -> float:
+    """The heading at the first place that lays the next `far` m by wheels along the places."""
+    poses = composed(motions)
+    beyond = np.flatnonzero(np.hypot(poses[:, 0], poses[:, 1]) > far)
+    many = int(beyond[0]) + 1 if len(beyond) else len(poses)
+    went, seen = placed(poses, mount)[:many, :2], places[:many]
+    went, seen = went - went.mean(axis=0), seen - seen.mean(axis=0)
+    cross = np.sum(went[:, 0] * seen[:, 1] - went[:, 1] * seen[:, 0])
+    return float(np.arctan2(cross, np.sum(went * seen)))
+
+
+def _learnable(robot: Robot, counters: Counters, drives: Sequence[RobotDrive], delay: float) -> list[Learned]:
+    known = robot_numbers(robot)
+    found = []
+    for name in counters.names:
+        if f"radius.{name}" in known:
+            found.append(learned(f"radius.{name}", "m", known[f"radius.{name}"].value))
+    for name in counters.names:
+        if name in robot.platform.inputs:
+            found.append(learned(f"scale.{name}", "1", 1.0))
+    for name, number in known.items():
+        if number.kind == "radius" or (number.kind == "hitch" and not all(drive.hitches for drive in drives)):
+            continue
+        found.append(learned(name, number.unit, number.value))
+    looked = [drive.rows for drive in drives if not drive.ends]
+    if looked:
+        found += [learned(name, "m" if name != MOUNT[2] else "rad", 0.0) for name in MOUNT[: max(looked)]]
+        found += [learned(DELAY, "s", delay), learned(CLOCK, "1", 0.0)]
+    return found

@@ -1,0 +1,117 @@
+"""Logs of simulated drives: a robot with true numbers, wheels that slip, a late and noisy reference."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+import nmm
+from nmm.base.arrays import Array
+from nmm.plugins.robot.calibration.stretches import stretches
+from nmm.plugins.robot.odometry import Counters, counted_wheels
+
+#: Inputs (N, p) at times (N,), s.
+Inputs = Callable[[Array], Array]
+
+
+def wander(p: int, seed: int = 0) -> Inputs:
+    """Inputs that come and go: sums of two slow sines each."""
+    rng = np.random.default_rng(seed)
+    frequencies, phases = rng.uniform(0.05, 0.3, (2, p)), rng.uniform(0.0, 2.0 * np.pi, (2, p))
+
+    def inputs(t: Array) -> Array:
+        angles = 2.0 * np.pi * frequencies[:, np.newaxis] * t[:, np.newaxis] + phases[:, np.newaxis]
+        return np.sin(angles[0]) + 0.7 * np.sin(angles[1])
+
+    return inputs
+
+
+def placed(poses: Array, mount: Sequence[float]) -> Array:
+    """Where a point of the body at `mount` (3,) is, (M, 3), while the body is at poses (M, 3)."""
+    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    x, y, yaw = mount
+    return poses + np.stack([c * x - s * y, s * x + c * y, np.full(len(poses), yaw)], axis=1)
+
+
+def composed(motions: Array) -> Array:
+    """Poses (M, 3) from the origin on, by motions (M - 1, 3) in the axes of where each begins."""
+    heading = np.concatenate([[0.0], np.cumsum(motions[:, 2])])
+    c, s = np.cos(heading[:-1]), np.sin(heading[:-1])
+    steps = np.stack([c * motions[:, 0] - s * motions[:, 1], s * motions[:, 0] + c * motions[:, 1]], axis=1)
+    return np.column_stack([np.vstack([[0.0, 0.0], np.cumsum(steps, axis=0)]), heading])
+
+
+def drive(
+    robot: nmm.Robot,
+    truth: Mapping[str, float] | None = None,
+    *,
+    inputs: Inputs | None = None,
+    seconds: float = 60.0,
+    rate: float = 50.0,
+    looks: float = 10.0,
+    mount: Sequence[float] = (0.2, 0.05, 0.1),
+    delay: float = 0.03,
+    place: float = 0.003,
+    heading: float = 0.003,
+    slip: float = 0.01,
+    seed: int = 0,
+    kind: str = "poses",
+    name: str = "drive",
+) -> nmm.DriveLog:
+    """A log of the robot whose numbers are `truth` where it is told.
+
+    inputs : by default `wander`; rate, looks : of encoders and of the reference, 1/s
+    mount : where the reference is on the robot, m, m, rad; delay : of its stamps, s
+    place, heading : standard deviations of the reference, m and rad
+    slip : of a wheel for a rad that it turns, rad: the ground sees it, its counter does not
+    """
+    truth = dict(truth or {})
+    moves = {n: v for n, v in truth.items() if n.partition(".")[0] not in ("offset", "ratio")}
+    true, rng = nmm.with_numbers(robot, moves), np.random.default_rng(seed)
+    names = counted_wheels(true) or [*true.platform.inputs]
+    counters = Counters(true, dict.fromkeys(names, 0.0), name)
+    t = np.arange(round(seconds * rate) + 1) / rate
+    u = (inputs or wander(true.platform.p, seed))(0.5 * (t[1:] + t[:-1]))
+    own, counts = _integrated(true, counters, u, 1.0 / rate)
+    slipped = rng.normal(size=(len(t) - 1, len(names))) * slip * np.sqrt(np.abs(np.diff(counts, axis=0)))
+    rolled = counts + np.vstack([np.zeros(len(names)), np.cumsum(slipped, axis=0)])
+    poses = composed(stretches(counters.record, t, rolled, own, t).motions)
+    every = round(rate / looks)
+    seen = placed(poses[::every], mount)
+    seen = seen + rng.normal(size=seen.shape) * [place, place, heading]
+    readings = {n: counts[:, i] for i, n in enumerate(names)}
+    for i, n in enumerate(true.q_names[3 : true.platform.n_p]):
+        readings[n] = (own[:, i] - truth.get(f"offset.{n}", 0.0)) / truth.get(f"ratio.{n}", 1.0)
+    columns = 2 if kind == "positions" else 3
+    return nmm.DriveLog(name, t, readings, t[::every] + delay, seen[:, :columns], kind)  # type: ignore[arg-type]
+
+
+def _integrated(robot: nmm.Robot, counters: Counters, u: Array, dt: float) -> tuple[Array, Array]:
+    """Own joints (N, n_p - 3) and counters (N, k) by inputs (N - 1, p), each for dt, s."""
+    n_p = robot.platform.n_p
+    qp, own = np.zeros(n_p), np.zeros((len(u) + 1, n_p - 3))
+    if n_p == 3:
+        M = counters.matrix(qp[3:])[0]
+        return own, np.vstack([np.zeros(len(M)), np.cumsum(dt * u @ M.T, axis=0)])
+    turned = np.zeros((len(u) + 1, len(counters.names)))
+    for n, un in enumerate(u):
+        middle = qp + 0.5 * dt * robot.platform.G(qp) @ un
+        turned[n + 1] = turned[n] + dt * counters.matrix(middle[3:])[0] @ un
+        qp = qp + dt * robot.platform.G(middle) @ un
+        own[n + 1] = qp[3:]
+    return own, turned
+
+
+def write(log: nmm.DriveLog, path: Path, *, turn: float = 2.0 * np.pi) -> tuple[Path, Path]:
+    """Two tables: counters, `turn` of a wheel's revolution (2 pi: rad; 1000: ticks), and the reference, m and
+    rad; its path."""
+    reference = path.with_name(f"{path.stem}_seen.csv")
+    ticks = [values * turn / (2.0 * np.pi) for values in log.readings.values()]
+    header = ",".join(["t", *log.readings])
+    np.savetxt(path, np.column_stack([log.t, *ticks]), "%.9g", ",", header=header, comments="")
+    columns = "t,x,y,theta" if log.kind == "poses" else "t,x,y"
+    seen = np.column_stack([log.reference_t, log.reference])
+    np.savetxt(reference, seen, "%.9g", ",", header=columns, comments="")
+    return path, reference
