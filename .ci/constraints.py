@@ -1,6 +1,6 @@
 """Writes constraints.txt: what pyproject.toml needs, with all extras, in the versions of the environment.
 
-.venv/bin/pip install -e '.[dev,docs,viewers]' && .venv/bin/python .ci/constraints.py
+.venv/bin/pip install -e '.[dev,docs,streams]' && .venv/bin/python .ci/constraints.py
 """
 
 import tomllib

@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from functools import cache
 from pkgutil import resolve_name
@@ -28,6 +29,7 @@ SHIPPED = (
     "nmm.plugins.live.plugin:PLUGIN",
     "nmm.plugins.robot.plugin:PLUGIN",
     "nmm.plugins.sweeps.plugin:PLUGIN",
+    "nmm.plugins.streams.plugin:PLUGIN",
 )
 #: What errors call the kinds that a plugin can add.
 KINDS = ("platform", "task", "reference", "objective", "resolver", "limit")
@@ -94,6 +96,16 @@ def _checked(entry: object, where: str) -> str:
     return str(entry)
 
 
+class Beside:
+    """What goes on beside a run, and cannot end it."""
+
+    def watch(self, recorder: Any) -> None:
+        """Called with what records the samples, as `simulate` does it."""
+
+    def end(self, run: Any, asked: bool) -> None:
+        """Called with the run when it is over and written; `asked` to end soon, by Ctrl-C."""
+
+
 class OptionGroup:
     """Options that a plugin adds to a command: a dataclass, each field's default a `typer.Option`."""
 
@@ -113,6 +125,10 @@ class OptionGroup:
     def answer(self, *subject: Any) -> int | None:
         """Answer for what the command is about: its exit status; None where the command goes on."""
         return None
+
+    def beside(self, scenario: Any, controller: Any) -> AbstractContextManager[Beside]:
+        """What goes on beside a run of `nmm run`, and is over with the block."""
+        return nullcontext(Beside())
 
 
 class Addition(NamedTuple):

@@ -70,6 +70,7 @@ def run(
         "--play", "Show the motion in the browser as it is computed, then play it; Ctrl-C ends it."
     ),
     browser: Browser,
+    beside: Annotated[AddedOptions, PlaceOfOptions("run")],
     ellipsoids: EllipsoidGroup,
     figures: Figures,
 ) -> int:
@@ -82,6 +83,7 @@ def run(
     nmm run unicycle_3r_spline --set 'q0={x: 0.2, q2: pi/3}' --html --out here
     nmm run unicycle_3r_position --ellipsoids --html
     nmm run unicycle_2r_position --format png,pdf --width column
+    nmm run unicycle_2r_position --stream rerun --stream foxglove=run.mcap
 
     The folder holds trajectory.npz and trajectory.csv (times, coordinates, inputs, errors, objective),
     summary.json (the numbers of the table), scenario.yaml (every key, to be run again) and figures as PNG,
@@ -94,6 +96,7 @@ def run(
 
     if not play:
         browser.refuse("--play")
+    beside.check()
     choice = None if resolver is None else chosen(resolver, "--resolver")
     changed, shown_ellipsoids = settings_of(settings), ellipsoids.wanted()
     drawn = figures.options()
@@ -118,12 +121,15 @@ def run(
             controller, made.parts.q0, made.parts.duration,
             title=title, surroundings=around, **browser.keywords(),
         )  # fmt: skip
-    with shown as page:
-        trajectory = _run(made, controller, None if page is None else page.watch, label)
+    with shown as page, beside.beside(made, controller) as others:
+        watching = [one.watch for one in (page, *others) if one is not None]
+        trajectory = _run(made, controller, lambda recorder: [watch(recorder) for watch in watching], label)
         with shielded() as asked_to_end:
             tell_and_save(trajectory, folder, html=html, ellipsoids=shown_ellipsoids, figures=drawn)
         status = _status("nmm run", [trajectory], folder)
         ends = asked_to_end.is_set() or trajectory.outcome == "interrupted"
+        for other in others:
+            other.end(trajectory, ends)
         if page is not None and len(trajectory) and not ends:
             page.stay(trajectory, ellipsoids=shown_ellipsoids)
     if play and planned and not ends:
@@ -295,7 +301,7 @@ def _load(
 def _run(
     scenario: Scenario,
     controller: Controller,
-    watch: Callable[[Recorder], None] | None = None,
+    watch: Callable[[Recorder], object] | None = None,
     label: str = "",
 ) -> Trajectory:
     from nmm.base.findings import Finding

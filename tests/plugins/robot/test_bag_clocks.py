@@ -421,6 +421,19 @@ WORDS = [
         {},
         "2 s of joint states, in which the platform's pose is not known, are left out",
     ),
+    (
+        "actions_beyond",
+        {"times": 2.0},
+        {},
+        "actions ask for up to 2 times the velocity measured of the platform: q and u are of what was "
+        "measured",
+    ),
+    (
+        "joints_outside",
+        {"names": ["q1"], "most": 1.5},
+        {},
+        "q1 is outside its limits by up to 1.5: another unit, or another zero?",
+    ),
 ]
 
 

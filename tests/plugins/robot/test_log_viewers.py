@@ -1,5 +1,5 @@
 """Logs in what Rerun makes of them and what Foxglove's package reads. Both are large (650 MB together, with
-what they need): pip install -e '.[test,viewers]'; docs/ros.md says what they draw."""
+what they need): pip install -e '.[test,streams]'; docs/ros.md says what they draw."""
 
 from __future__ import annotations
 

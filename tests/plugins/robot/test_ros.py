@@ -10,6 +10,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from gripping_cart import cart
 from places import ROOT
@@ -82,6 +83,16 @@ def test_a_unicycle_s_inputs_are_its_cmd_vel() -> None:
     robot = nmm.load("unicycle_2r")
     twist = nmm.ros.Messages(robot, STORE.types).twist([0, 0, 0, 1, 2], [0.5, -0.2, 3, 4])
     assert (twist.linear.x, twist.linear.y, twist.angular.z) == (0.5, 0.0, -0.2)
+
+
+def test_a_fixed_base_has_no_twist() -> None:
+    """Its first three coordinates are joints of the arm."""
+    robot = nmm.load(pin.buildSampleModelManipulator(), platform="fixed")
+    messages = nmm.ros.Messages(robot, STORE.types)
+    q, ones = robot.rest, np.ones(robot.n)
+    assert robot.n > 3
+    for twist in (messages.twist(q, ones), messages.odometry(0.0, q, ones).twist.twist):
+        assert [twist.linear.x, twist.linear.y, twist.angular.z] == [0.0, 0.0, 0.0]
 
 
 def test_poses_paths_and_trajectories() -> None:

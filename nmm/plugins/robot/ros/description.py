@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, tostring
 
@@ -21,16 +22,19 @@ fcl = pin.hppfcl
 PACKAGE = "package://"
 
 
-def description(robot: Robot, links: Links) -> tuple[str, list[str]]:
+def description(
+    robot: Robot, links: Links, address: Callable[[str], str] | None = None
+) -> tuple[str, list[str]]:
     """The text: links, joints with limits and mimics, what is drawn; and the names of shapes that URDF has no
-    words for. Joints turn as in the robot's files, so that their names and signs are those of JointStates.
-    Meshes have the package:// names of the files, or else file:// names."""
+    words for. Joints turn as in the robot's files, so that their names and signs are those of JointStates; of
+    those that are corrected (`nmm.with_numbers`) URDF has words for the offset, not for a ratio. A mesh's
+    `address` is given its file; by default it is `by_package`."""
     root, left_out = Element("robot", name=robot.name), []
     written = {name: SubElement(root, "link", name=name) for name in links.links}
-    files = packaged(robot)
+    address = address or by_package(robot)
     for shape in appearance(robot).shapes.geometryObjects:
         name = links.holder(shape.parentFrame, shape.parentJoint)
-        parts = list(_parts(shape, files))
+        parts = list(_parts(shape, address))
         if not parts:
             left_out.append(str(shape.name))
         for geometry, at in parts:
@@ -57,9 +61,28 @@ def packaged(robot: Robot) -> dict[str, tuple[str, str]]:
     return places
 
 
+def by_package(robot: Robot) -> Callable[[str], str]:
+    """Addresses of meshes: the package:// names of the files, or else file:// names."""
+    files = packaged(robot)
+
+    def address(file: str) -> str:
+        _, inside = files.get(file, ("", ""))
+        return f"{PACKAGE}{inside}" if inside else by_file(file)
+
+    return address
+
+
+def by_file(file: str) -> str:
+    """The file:// name of a mesh, with blanks and letters as they are: Rerun and others unquote nothing."""
+    return f"file://{file}"
+
+
 def _write_joint(root: Element, robot: Robot, link: Link, place: Array) -> None:
-    model, sign = robot.display_model, -1.0 if link.joint in robot.reversed_joints else 1.0
+    model, (factor, offset) = robot.display_model, robot.gear(link.joint)
+    sign = math.copysign(1.0, factor)
     joint = SubElement(root, "joint", name=link.joint, type="fixed")
+    if offset:  # what an encoder reads there is 0 at the offset
+        place = place @ pin.SE3(pin.exp3(offset * joint_screw(model, link.on)[1]), np.zeros(3)).homogeneous
     _write_origin(joint, place)
     SubElement(joint, "parent", link=link.parent)
     SubElement(joint, "child", link=link.name)
@@ -71,11 +94,13 @@ def _write_joint(root: Element, robot: Robot, link: Link, place: Array) -> None:
         joint.set("type", "floating")  # a screw: URDF has none, and TF moves it
         return
     i, v = model.joints[link.on].idx_q, model.joints[link.on].idx_v
-    ends = sorted(sign * float(end[i]) for end in (model.lowerPositionLimit, model.upperPositionLimit))
+    limits = (model.lowerPositionLimit, model.upperPositionLimit)
+    ends = sorted(robot.reading(link.joint, float(end[i])) for end in limits)
     unlimited = turns and np.isinf(ends).all()
     joint.set("type", "continuous" if unlimited else "revolute" if turns else "prismatic")
     SubElement(joint, "axis", xyz=_text(sign * (angular if turns else linear)))
-    most = {"effort": _number(model.upperEffortLimit[v]), "velocity": _number(model.velocityLimit[v])}
+    fastest = float(model.velocityLimit[v]) / abs(factor)
+    most = {"effort": _number(model.upperEffortLimit[v]), "velocity": _number(fastest)}
     limit = SubElement(joint, "limit", most)
     if not unlimited:
         limit.attrib |= {"lower": _number(ends[0]), "upper": _number(ends[1])}
@@ -86,9 +111,7 @@ def _write_joint(root: Element, robot: Robot, link: Link, place: Array) -> None:
             SubElement(joint, "mimic", {"joint": mimic.leader, **numbers})
 
 
-def _parts(
-    shape: pin.GeometryObject, files: Mapping[str, tuple[str, str]]
-) -> Iterator[tuple[Element, Array]]:
+def _parts(shape: pin.GeometryObject, address: Callable[[str], str]) -> Iterator[tuple[Element, Array]]:
     """A shape in URDF's words, each with its place (4, 4) in it; nothing where there are none."""
     form, middle = shape.geometry, np.eye(4)
     if isinstance(form, fcl.Box):
@@ -103,9 +126,7 @@ def _parts(
                 at = pin.SE3(np.eye(3), np.array([0.0, 0.0, end]))
                 yield Element("sphere", radius=radius), at.homogeneous
     elif shape.meshPath and Path(shape.meshPath).is_absolute():
-        _, inside = files.get(shape.meshPath, ("", ""))
-        name = f"{PACKAGE}{inside}" if inside else f"file://{shape.meshPath}"
-        yield Element("mesh", filename=name, scale=_text(shape.meshScale)), middle
+        yield Element("mesh", filename=address(shape.meshPath), scale=_text(shape.meshScale)), middle
 
 
 def _write_origin(parent: Element, place: Array) -> None:

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
-from nmm.base.arrays import Array, scalar
+from nmm.base.arrays import scalar
 from nmm.base.errors import InputError, expect, few
 from nmm.base.files import replaceable, whole_file, written_at
 from nmm.model.robots.configuration import Configuration
 from nmm.plugins.robot.ros.description import description
-from nmm.plugins.robot.ros.links import Links
-from nmm.plugins.robot.ros.making import Messages
-from nmm.views.playback.placements import position_and_quaternion, rolling_joints
+from nmm.plugins.robot.ros.making import Messages, rolled_readings
+from nmm.plugins.robot.ros.placed import PlacedFrames
+from nmm.views.playback.placements import rolling_joints
 from nmm.views.playback.rolling import Rolling
 
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ PATH, DESIRED = "/path", "/desired_path"
 BASE_POSE, FRAME_POSE, DESIRED_POSE = "/base_pose", "/end_effector_pose", "/desired_pose"
 #: Topics whose last message is for whoever comes later.
 LATCHED = (TF_STATIC, DESCRIPTION, PATH, DESIRED)
-MAP = "map"
 SUFFIX = ".mcap"
 #: One message: nanoseconds, topic, message.
 Timed = tuple[int, str, Any]
@@ -77,24 +76,20 @@ def save_mcap(trajectory: Trajectory, path: str | Path, start: float = 0.0) -> P
 def messages_of(trajectory: Trajectory, made: Messages) -> Iterator[Timed]:
     """All messages of a log in the order of their times."""
     run, robot = trajectory, trajectory.robot
-    world = "odom" if run.believed is None else MAP
+    placed = PlacedFrames(robot, made.base, made.odom, believed=run.believed is not None)
+    world, ground = placed.world, placed.ground
     counted = run.q if run.believed is None else run.believed
-    links, rolling = Links(robot, made.base), Rolling(robot)
+    rolling = Rolling(robot)
     angles, wheels = rolling.angles(counted, run.u), rolling_joints(robot)
     begin = float(run.t[0])
     first = made.nanoseconds(begin)
-    text, left_out = description(robot, links)
+    text, left_out = description(robot, placed.links)
     yield first, DESCRIPTION, made.text(text)
     if left_out:
         words = f"shapes that a URDF has no words for are not drawn: {few(left_out)}"
         yield first, EVENTS, made.log(begin, DESCRIPTION, words)
-    # x and y count from the ground's frame, which the log calls odom, or map: a root may stand elsewhere.
-    ground = robot.model.jointPlacements[1].inverse() if robot.platform.n_p else pin.SE3.Identity()
-    still = [
-        (world, name, *position_and_quaternion((ground * place).homogeneous)) for name, place in links.ground
-    ]
-    if still := [*links.fixed, *still]:
-        yield first, TF_STATIC, made.tf([(begin, *transform) for transform in still])
+    if placed.still:
+        yield first, TF_STATIC, made.tf([(begin, *transform) for transform in placed.still])
     for topic, points in ((PATH, run.path), (DESIRED, run.moving)):
         if points is not None and len(points):
             yield first, topic, made.path(begin, [ground.act(point) for point in points], world)
@@ -109,33 +104,20 @@ def messages_of(trajectory: Trajectory, made: Messages) -> Iterator[Timed]:
         spins = rolling.rates(seen, u, angles[k]) if wheels else np.zeros(0)
         q_dot = run.q_dot[k] if run.believed is None else robot.S(seen) @ u
         turned = dict(zip(wheels, zip(angles[k], spins, strict=True), strict=True))
-        yield now, JOINTS, made.joint_state(t, q, q_dot, turned)
+        yield now, JOINTS, made.joint_state(t, q, q_dot, rolled_readings(robot, turned, seen, q_dot))
         yield now, ODOMETRY, made.odometry(t, seen, q_dot)
-        stand = planar_matrix(seen if robot.platform.n_p else np.zeros(3))
-        yield now, BASE_POSE, made.pose(t, stand)
+        yield now, BASE_POSE, made.pose(t, placed.stand(seen))
         if posed:
             reached = ground * Configuration(robot, q).placement(str(run.frame))
             yield now, FRAME_POSE, made.pose(t, reached.homogeneous, world)
         if run.desired is not None and np.isfinite(run.desired[k]).all():
             wanted = pin.SE3(np.eye(3), ground.act(run.desired[k]))
             yield now, DESIRED_POSE, made.pose(t, wanted.homogeneous, world)
-        moved = [(t, *transform) for transform in links.moving(q, angles[k])]
-        frames = [(t, made.odom, made.base, *position_and_quaternion(stand))]
-        if run.believed is not None:
-            off = planar_matrix(q) @ np.linalg.inv(stand)
-            frames.append((t, MAP, made.odom, *position_and_quaternion(off)))
-        yield now, TF, made.tf([*frames, *moved])
+        yield now, TF, made.tf([(t, *transform) for transform in placed.at(q, seen, angles[k])])
         yield now, TWIST, made.twist_stamped(t, seen, u)
         yield now, INPUTS, made.inputs(t, u)
         if run.r_names:
             yield now, ERROR, made.numbers(run.error[k], run.r_names)
-
-
-def planar_matrix(q: Array) -> Array:
-    """The platform's pose (4, 4) at q."""
-    x, y, theta = q[:3]
-    c, s = np.cos(theta), np.sin(theta)
-    return np.array([[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, 0], [0, 0, 0, 1]], dtype=np.float64)
 
 
 def _latched(interfaces: Any) -> Any:

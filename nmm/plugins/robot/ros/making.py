@@ -80,13 +80,14 @@ class Messages:
         wheels: Mapping[str, tuple[float, float]] | None = None,
     ) -> Any:
         """A JointState at t, s: the joints of q (n,), without x, y, theta, and their rates q_dot (n,) where
-        given; angle and rate of further joints, rad and rad/s. Signs are the file's."""
+        given; angle and rate of further joints, rad and rad/s. Signs are the file's, and corrections of the
+        robot's joints (`nmm.with_numbers`) are taken out again: what their encoders read."""
         more = {} if wheels is None else wheels
-        names = [*self.robot.q_names[self._first :], *more]
-        position = [*self._signed(self.robot.q(q)), *(float(angle) for angle, _ in more.values())]
+        names = [*joint_names(self.robot), *more]
+        position = [*readings(self.robot, self.robot.q(q)), *(float(angle) for angle, _ in more.values())]
         rates: list[float] = []
         if q_dot is not None:
-            rates = self._signed(vector(q_dot, self.robot.n, "q_dot"))
+            rates = readings(self.robot, vector(q_dot, self.robot.n, "q_dot"), rates=True)
             rates += (float(rate) for _, rate in more.values())
         return self._joint_state(t, names, position, rates)
 
@@ -106,7 +107,9 @@ class Messages:
         spread = unknown if covariance is None else np.zeros((6, 6))
         if covariance is not None:
             spread[np.ix_([0, 1, 5], [0, 1, 5])] = matrix(covariance, (3, 3), "covariance")
-        velocity = np.zeros(3) if q_dot is None else body_twist(q, vector(q_dot, self.robot.n, "q_dot"))
+        velocity = np.zeros(3)
+        if q_dot is not None:
+            velocity = body_twist(self.robot, q, vector(q_dot, self.robot.n, "q_dot"))
         pose = self._pose(*planar_pose(q[:3] if self._first else np.zeros(3)))
         covariances = [self._floats(block.ravel()) for block in (spread, unknown)]
         kinds = [f"geometry_msgs/msg/{name}WithCovariance" for name in ("Pose", "Twist")]
@@ -148,7 +151,7 @@ class Messages:
     def twist(self, q: ArrayLike, u: ArrayLike) -> Any:
         """A Twist (cmd_vel) of the inputs u (n_u,) at q (n,), along the base's axes."""
         q = self.robot.q(q)
-        return self._twist(body_twist(q, self.robot.S(q) @ vector(u, self.robot.n_u, "u")))
+        return self._twist(body_twist(self.robot, q, self.robot.S(q) @ vector(u, self.robot.n_u, "u")))
 
     def twist_stamped(self, t: float, q: ArrayLike, u: ArrayLike) -> Any:
         """The same with the time t, s, in the base's frame."""
@@ -213,11 +216,6 @@ class Messages:
             "rcl_interfaces/msg/Log",
             stamp=self._time(t), level=20, name=name, msg=text, file="", function="", line=0,
         )  # fmt: skip
-
-    def _signed(self, values: Array) -> list[float]:
-        turned = self.robot.reversed_joints
-        pairs = zip(self.robot.q_names[self._first :], values[self._first :].tolist(), strict=True)
-        return [-value if name in turned else value for name, value in pairs]
 
     def _joint_state(self, t: float, names: list[str], position: list[float], velocity: list[float]) -> Any:
         return self._made(
@@ -294,9 +292,32 @@ def base_joint(robot: Robot) -> int:
     return int(robot.model.getJointId("theta")) if robot.platform.n_p else 0
 
 
-def body_twist(q: Array, q_dot: Array) -> Array:
-    """(3,) the platform's velocity q_dot along its own x and y, and about z."""
-    if len(q) < 3:
+def joint_names(robot: Robot) -> tuple[str, ...]:
+    """The joints of q: all coordinates but the platform's x, y and theta."""
+    return robot.q_names[min(3, robot.platform.n_p) :]
+
+
+def readings(robot: Robot, values: Array, rates: bool = False) -> list[float]:
+    """What the encoders of those joints read where a row like q (n,), or its rates, has these values."""
+    names = joint_names(robot)
+    pairs = zip(names, values[robot.n - len(names) :].tolist(), strict=True)
+    if rates:
+        return [value / robot.gear(name)[0] for name, value in pairs]
+    return [robot.reading(name, value) for name, value in pairs]
+
+
+def rolled_readings(
+    robot: Robot, wheels: Mapping[str, tuple[float, float]], q: Array, q_dot: Array
+) -> dict[str, tuple[float, float]]:
+    """What the encoders of wheels and their swivels read, by joint, rad and rad/s: as they roll, and where a
+    car's steering angle is corrected its swivels as that angle reads at q (n,) and q_dot (n,)."""
+    read = robot.swivel_readings(q, q_dot) if robot.corrections else {}
+    return {name: read.get(name, rolled) for name, rolled in wheels.items()}
+
+
+def body_twist(robot: Robot, q: Array, q_dot: Array) -> Array:
+    """(3,) the platform's velocity q_dot along its own x and y, and about z; zero of a fixed base."""
+    if not robot.platform.n_p:
         return np.zeros(3)
     c, s = math.cos(q[2]), math.sin(q[2])
     return np.array([c * q_dot[0] + s * q_dot[1], c * q_dot[1] - s * q_dot[0], q_dot[2]])

@@ -58,11 +58,10 @@ class Recorded:
 
     def __init__(self, robot: Robot, file: Path, names: Names) -> None:
         self.robot, self.names = robot, names
-        self.own = robot.q_names[min(3, robot.platform.n_p) :]
+        self.own, self._needed = self._joints()
         self.positions, self.velocities = dict[str, Track](), dict[str, Track]()
         self.inputs, self.twists, self.tree = Track(), Track(), Tree()
         self._odometry: dict[tuple[str, str], tuple[Edge, list[Any]]] = {}
-        self._needed = timed_joints(robot)
         self._known = self._needed | {*robot.locked}
         self._not_finite: dict[str, int] = {}
         log = Log(file)
@@ -74,6 +73,10 @@ class Recorded:
         self.findings = [*log.findings]
         self.odometry = self._one_odometry()
         self._finish(log)
+
+    def _joints(self) -> tuple[tuple[str, ...], set[str]]:
+        """The joints of q, and those whose positions are kept."""
+        return self.robot.q_names[min(3, self.robot.platform.n_p) :], timed_joints(self.robot)
 
     @property
     def odometry_topic(self) -> str:
@@ -117,16 +120,20 @@ class Recorded:
             (topic, kind): take for topic, kinds, take in asked for kind in kinds if (topic, kind) in topics
         }
         kinds = {kind for _, kind in takes if (_, kind) != (names.topic("inputs"), JOINT_STATE)}
-        needed = [(f"{JOINT_STATE} on {' or '.join(joints)}", {JOINT_STATE})] if self.own else []
-        if self.robot.platform.n_p:
-            needed.append((f"{ODOMETRY} on {self.odometry_topic} or {TRANSFORMS[0]} on {tf}",
-                           {ODOMETRY, *TRANSFORMS}))  # fmt: skip
-        for what, some in needed:
+        for what, some in self._needs(f"{JOINT_STATE} on {' or '.join(joints)}", tf):
             if not some & kinds:
                 near = sorted(topics, key=lambda topic: topic[1] not in some)
                 available = [f"{topic} ({kind})" for topic, kind in near]
                 raise InputError(expected=f"a topic of {what}", available=available)
         return takes
+
+    def _needs(self, joints: str, tf: str) -> list[tuple[str, set[str]]]:
+        """What there must be, in words, and the types of messages of which any will do."""
+        needed = [(joints, {JOINT_STATE})] if self.own else []
+        if self.robot.platform.n_p:
+            what = f"{ODOMETRY} on {self.odometry_topic} or {TRANSFORMS[0]} on {tf}"
+            needed.append((what, {ODOMETRY, *TRANSFORMS}))
+        return needed
 
     def _take_joints(self, _: str, recorded: int, message: Any) -> None:
         positions, velocities = parts(message, self._known, self.prefix)

@@ -1,0 +1,1 @@
+"""Streams: what a robot does, shown live by Rerun and Foxglove, or recorded for them."""
