@@ -1,4 +1,4 @@
-"""What reading a robot's log found (`nmm.read_bag`)."""
+"""What reading a robot's log found (`nmm.read_bag`), or a data set (`nmm.read_lerobot`)."""
 
 from nmm.base.findings.finding import Words
 
@@ -23,4 +23,8 @@ WORDS: dict[str, Words] = {
     "child_unnamed": "{topic} does not say whose pose it is: taken for the reference point's",
     "platform_silent": "no pose of the platform from t = {t:.4g} to {end:.4g} s: a straight line in between",
     "platform_unknown": "{s:.4g} s of joint states, in which the platform's pose is not known, are left out",
+    "actions_beyond": "actions ask for up to {times:.3g} times the velocity measured of the platform: q "
+    "and u are of what was measured",
+    "joints_outside": "{names:and} {names:plural is|are} outside {names:plural its|their} limits by up to "
+    "{most:.3g}: another unit, or another zero?",
 }

@@ -1,54 +1,90 @@
-"""export, and compare with a bag: runs as logs of ROS 2's messages, and a robot's logs beside runs."""
+"""export, and compare with a bag: runs as logs of ROS 2 and as data sets, a robot's logs beside runs."""
 
 from __future__ import annotations
 
 import os
 import warnings
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from nmm.base.errors import InputError
+from nmm.base.errors import InputError, expect
 from nmm.base.plugins import OptionGroup
 from nmm.cli.groups import opening_command
 from nmm.cli.interrupts import shielded
 from nmm.cli.options import flag, names_of, option
 from nmm.cli.output import OK, show_table, show_text, warn
 
+if TYPE_CHECKING:
+    from nmm.motion.trajectory import Trajectory
+
 
 @opening_command
 def export(
-    folder: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A folder of `nmm run`.")],
-    file: Annotated[
-        Path | None, typer.Argument(metavar="[FILE]", help="Ends in .mcap.", show_default="RUN_DIR.mcap")
-    ] = None,
+    folders: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RUN_DIR", help="Folders of `nmm run`; with --mcap one, and the log, RUN_DIR.mcap."
+        ),
+    ],
     *,
     mcap: bool = flag("--mcap", "An MCAP file of ROS 2's messages."),
-    start: float = option("S", "The clock's time at the run's t = 0, s since 1970.", default=0.0),
+    lerobot: Path | None = option("DIR", "A data set of LeRobot's, an episode a run.", show="none"),
+    start: float | None = option("S", "The clock's time at the run's t = 0, s since 1970.", show="0"),
+    task: str | None = option("TEXT", "What is done, in a data set.", show="the scenario's title"),
+    fps: int | None = option("N", "Frames a second of a data set.", show="30"),
 ) -> int:
-    """Write a run as a log that Foxglove, Rerun and ROS 2's tools open.
+    """Write a run as a log that Foxglove, Rerun and ROS 2's tools open, or runs as a data set of LeRobot's.
 
-    Joint states, TF, odometry, poses, twist, inputs, task error, paths, events, the robot's description
-    (docs/ros.md). Needs pip install rosbags.
+    A log has joint states, TF, odometry, poses, twist, inputs, task error, paths, events, the robot's
+    description (docs/ros.md); it needs pip install rosbags. A data set, v3.0, has states, actions and
+    targets in SI units, which it states (docs/data_sets.md); it needs pip install pyarrow.
 
     \b
     nmm export runs/unicycle_2r_position-rg --mcap
     nmm export runs/unicycle_2r_position-rg --mcap here.mcap --start 1700000000
+    nmm export runs/pick-* --lerobot picks --task "pick up the cube" --fps 20
     """
+    if mcap == (lerobot is not None):
+        raise InputError("say what to write", expected="--mcap or --lerobot DIR")
+    for name, value, fits in (("task", task, not mcap), ("fps", fps, not mcap), ("start", start, mcap)):
+        expect(value is None or fits, f"--{name}", f"--{'lerobot' if mcap else 'mcap'}, which it is of")
+    if lerobot is None:
+        return _write_log(folders, start or 0.0)
+    from nmm.plugins.robot.lerobot.writing import write_lerobot
+
+    write_lerobot(_runs_of(folders), lerobot, task=task, fps=30 if fps is None else fps)
+    show_text(f"written: {lerobot}")
+    return OK
+
+
+def _runs_of(folders: list[Path]) -> Iterator[Trajectory]:
+    """The runs of folders, called as these are."""
+    from nmm.motion.trajectory import Trajectory
+
+    for folder in folders:
+        run = Trajectory.load(folder)
+        if not run.complete:
+            warn(f"{folder}: {run.outcome}: {run.message}")
+        yield replace(run, label=str(folder))
+
+
+def _write_log(folders: list[Path], start: float) -> int:
     from nmm.motion.trajectory import Trajectory
     from nmm.plugins.robot.ros.description import packaged
 
-    if not mcap:
-        raise InputError("say what to write", where="nmm export", expected="--mcap")
-    path = Path(f"{folder.resolve()}.mcap") if file is None else file
+    expect(len(folders) <= 2, "--mcap", "a run, and a file", [str(folder) for folder in folders])
+    folder = folders[0]
+    path = folders[1] if len(folders) == 2 else Path(f"{folder.resolve()}.mcap")
     run = Trajectory.load(folder)
     with shielded():
         run.save_mcap(path, start)
     show_text(f"written: {path}")
-    if folders := dict.fromkeys(folder for folder, _ in packaged(run.robot).values()):
-        show_text(f"its meshes are found with ROS_PACKAGE_PATH={os.pathsep.join(folders)}")
+    if found := dict.fromkeys(folder for folder, _ in packaged(run.robot).values()):
+        show_text(f"its meshes are found with ROS_PACKAGE_PATH={os.pathsep.join(found)}")
     return OK
 
 
