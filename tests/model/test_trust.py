@@ -268,6 +268,15 @@ def test_a_runs_robot_is_trusted_by_whoever_loads_it(tmp_path: Path) -> None:
     assert len(nmm.Trajectory.load(tmp_path / "run", trust=True)) == 3
 
 
+def test_a_sweeps_robots_are_trusted_by_whoever_loads_it(tmp_path: Path) -> None:
+    scenario, file = scenario_of_a_program(tmp_path), tmp_path / "sweep.yaml"
+    file.write_text(f"scenario: {scenario}\nvary: {{q0.x: [0.0, 0.1]}}\n", encoding="utf-8")
+    with pytest.raises(nmm.InputError, match="trust"):
+        nmm.Sweep.load(file)
+    done = nmm.Sweep.load(file, trust=True).run(tmp_path / "sweep", jobs=1)
+    assert sum(done.outcomes.values()) == 2
+
+
 def test_scenarios_cannot_trust_themselves() -> None:
     assert "trust" not in nmm.Scenario.load("unicycle_2r_position").resolved()["robot"]
     with pytest.raises(nmm.ScenarioError):

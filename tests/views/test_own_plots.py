@@ -123,15 +123,24 @@ def test_a_quantity_over_another_has_the_clock_on_its_curve(page: Page, runs: li
 
 
 def test_the_address_has_the_plots(page: Page) -> None:
-    for keys, over in (("'q1', 'u_v'", ""), ("'y'", "x")):
+    for keys, over in (("'q1', 'u_v'", ""), ("'y'", "x"), ("'error_norm'", "")):
         page.evaluate(f"nmm.own.add([{keys}], '{over}')")
-    page.wait_for_function("location.hash.endsWith('&plot=q1,u_v&plot=y~x')")
+    page.wait_for_function("location.hash.endsWith('&plot=q1,u_v&plot=y~x&plot=error_norm')")
+    for number in (2, 1):
+        own(page, number).get_by_label("log").check()
+    page.wait_for_function("location.hash.endsWith('&plot=q1,u_v&plot=y~x~log&plot=error_norm~~log')")
+    own(page, 1).get_by_label("log").uncheck()
+    page.wait_for_function("location.hash.endsWith('&plot=q1,u_v&plot=y~x&plot=error_norm~~log')")
     address = page.url
     page.goto("about:blank")
     page.goto(address)
     page.wait_for_function("!document.body.classList.contains('loading')")
     titles = [own(page, i).locator("summary > span").first.inner_text() for i in range(2)]
     assert titles == ["q₁ [rad], v [m/s]", "y [m] over x [m]"]
+    assert [own(page, i).get_by_label("log").is_checked() for i in range(3)] == [False, False, True]
+    assert page.evaluate(
+        "nmm.plots.panels.filter((panel) => panel.own).map(({ lanes }) => lanes[0].log)"
+    ) == [*(False, False, True)]
     page.evaluate("location.hash = '#plot=nobody&plot=u_v~constructor&plot=__proto__'")
     page.wait_for_function("nmm.own.text().join() === 'plot=u_v'")
 

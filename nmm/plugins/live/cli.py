@@ -11,7 +11,17 @@ import typer
 
 from nmm.base.errors import InputError, expect
 from nmm.cli.groups import Browser, EllipsoidGroup, Loading, Subject, command, opening_command
-from nmm.cli.options import ARM, AT, ROBOT_HELP, SUBJECT_SET, arguments_of, flag, option, task_option
+from nmm.cli.options import (
+    ARM,
+    AT,
+    ROBOT_HELP,
+    SUBJECT_SET,
+    arguments_of,
+    flag,
+    option,
+    task_option,
+    values_of,
+)
 from nmm.cli.output import progress, show_text, warn
 
 if TYPE_CHECKING:
@@ -194,25 +204,38 @@ def _viewable(scenario: Scenario, robot: Robot) -> list[Task | Function] | None:
 
 
 @command
-def drive(subject: Subject, browser: Browser, loading: Loading) -> None:
+def drive(
+    subject: Subject,
+    browser: Browser,
+    loading: Loading,
+    jog_speed: list[str] | None = option(
+        "NAME=VALUE",
+        "Of what one jogs with full keys or sticks: linear (m/s) and angular (rad/s) of the hand, or an "
+        "input of the platform by its name. May be repeated.",
+        "--jog-speed",
+        show="0.25 m/s and 0.5 rad/s; half the robot's limit where that is less",
+    ),
+) -> None:
     """Drag a target in the browser; the robot follows.
 
-    In 3D, with MeshCat, and with its curves: the target of each task is dragged, typed, or moved with keys
-    or a gamepad. Resolver, gains, weights and limits are changed while it moves. A scenario's references are
-    left aside, but for where they begin; a robot holds its arm's end where it is at first. With the button
-    Plan, or the key N, the robot follows plans to the target, round what is in the way (docs/plans.md). Only
-    this machine can reach it. Ctrl-C ends it.
+    In 3D, with MeshCat, and with its curves: the target of each task is dragged, typed, or moved with keys;
+    while J is held, or a button of a gamepad or a SpaceMouse, these move hand or base. Resolver, gains,
+    weights and limits are changed while it moves. A scenario's references are left aside, but for where they
+    begin; a robot holds its arm's end where it is at first. With the button Plan, or the key N, the robot
+    follows plans to the target, round what is in the way (docs/plans.md). Only this machine can reach it.
+    Ctrl-C ends it.
 
     \b
     nmm drive unicycle_3r_position
     nmm drive behind_the_wall
-    nmm drive tiago_pose
+    nmm drive tiago_pose --jog-speed linear=0.1 --jog-speed v=0.3
     nmm drive my_robot.urdf --platform car --task position:gripper:xyz --at shoulder=pi/4
     """
     from nmm.cli.subjects import studied
     from nmm.plugins.live.driving import RobotSetup, ScenarioSetup
     from nmm.plugins.live.driving import drive as drive_in_browser
 
+    speeds = values_of(jog_speed, "--jog-speed", "NAME=VALUE, as in linear=0.1")
     asked = subject.keywords() | loading.keywords()
     study = studied(subject.subject, to_drive=True, **asked)
     setup: DriveSetup
@@ -221,4 +244,4 @@ def drive(subject: Subject, browser: Browser, loading: Loading) -> None:
         setup = RobotSetup(study.robot, tuple(study.task), study.q)
     else:
         setup = ScenarioSetup(study.scenario, study.q)
-    drive_in_browser(setup, **browser.keywords())
+    drive_in_browser(setup, jog_speeds=speeds, **browser.keywords())

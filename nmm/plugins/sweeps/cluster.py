@@ -11,8 +11,9 @@ from typing import Any
 
 from nmm import __version__
 from nmm.base.errors import InputError, NmmError, RunError, expect
+from nmm.base.extras import needed
 from nmm.base.text_format import listed
-from nmm.plugins.sweeps.rows import Computed, needed
+from nmm.plugins.sweeps.rows import Computed
 
 #: How long a scheduler may take to answer and to have a worker, s.
 PATIENCE = 10.0

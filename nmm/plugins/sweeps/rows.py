@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -21,6 +20,7 @@ import numpy as np
 
 from nmm import __version__
 from nmm.base.errors import InputError, RunError
+from nmm.base.extras import needed
 from nmm.base.progress import Progress
 from nmm.base.trust import trusting
 from nmm.control.step.quantities import placed
@@ -43,16 +43,6 @@ _own = threading.local()
 Keep = Callable[[int, "Trajectory"], None]
 Key = TypeVar("Key")
 Value = TypeVar("Value")
-
-
-def needed(module: str, what: str) -> Any:
-    """A module of the extra `sweep`; `InputError` if it is not installed says what needs it."""
-    try:
-        return import_module(module)
-    except ImportError:
-        package = module.split(".")[0]
-        problem = f"{what} needs {package}, which is not installed: pip install {package}"
-        raise InputError(problem) from None
 
 
 arrow = partial(needed, "pyarrow", "a sweep's table in Parquet")

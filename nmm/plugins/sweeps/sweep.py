@@ -17,6 +17,7 @@ from nmm.base.errors import InputError, ScenarioError, expect, expect_known
 from nmm.base.processes import as_done
 from nmm.base.progress import Progress
 from nmm.base.text_format import listed
+from nmm.base.trust import trusting
 from nmm.plugins.sweeps.cluster import as_done_by, cluster
 from nmm.plugins.sweeps.definition import (
     GRID,
@@ -114,14 +115,16 @@ class Sweep:
         )
 
     @classmethod
-    def load(cls, name_or_path: str | Path, **changes: Any) -> Sweep:
-        """A sweep that is bundled (`unicycle_2r_starts`) or a YAML file, with other keywords.
+    def load(cls, name_or_path: str | Path, *, trust: bool = False, **changes: Any) -> Sweep:
+        """A sweep that is bundled (`unicycle_2r_starts`) or a YAML file, with other keywords. `trust`: of its
+        robots' files, as of `nmm.load`.
 
         Raises
         ------
         InputError : no such sweep, or what is wrong with it
         """
-        return cls(**(read_sweep(name_or_path) | changes))
+        with trusting(trust):
+            return cls(**(read_sweep(name_or_path) | changes))
 
     def run(
         self,

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 import threading
-from contextlib import AbstractContextManager
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from driven_pages import driven, opened
 from playback_browser import UPRIGHT, WALK, Window, draw_frames, watched
 from playback_browser import browser as browser
 from playback_browser import empty_page as empty_page
 from playback_browser import window as window
 from playwright.sync_api import Browser, Page
-from ports import MOST, served
+from ports import MOST
 
 import nmm
 from nmm.base.resolver_style import resolver_styles
 from nmm.model.robots.configuration import Configuration
-from nmm.plugins.live.driving import DriveSetup, RobotSetup, ScenarioSetup, drive
+from nmm.plugins.live.driving import RobotSetup, ScenarioSetup
 from nmm.plugins.live.driving.driven import Driven
 
 #: Where a point of a gizmo is in the window, px: its ball, or the tip of the arrow along an axis.
@@ -37,17 +37,6 @@ ERROR = "nmm.state().runs[0].values.error_norm"
 @pytest.fixture(scope="module")
 def setup() -> ScenarioSetup:
     return ScenarioSetup(nmm.Scenario.load("unicycle_3r_position"))
-
-
-def driven(setup: DriveSetup) -> AbstractContextManager[str]:
-    """The address of a robot that is driven."""
-    return served(drive, setup)
-
-
-def opened(window: Window, url: str) -> Page:
-    page = window.open(url)
-    page.wait_for_function("nmm.drive.targets.length > 0 && nmm.drive.time > 0 && nmm.gizmos.all.length > 0")
-    return page
 
 
 def target(page: Page) -> np.ndarray:
@@ -558,67 +547,6 @@ def test_a_plan_where_the_robot_is_ends_and_the_page_lives(window: Window, setup
         page.locator("#again").click()
         page.wait_for_function(f"nmm.drive.time < {time}", timeout=1000.0 * MOST)
         assert not page.evaluate("nmm.silent")
-
-
-#: A gamepad as a browser gives it: axes 0 and 1 of the left stick, 2 and 3 of the right one.
-GAMEPAD = """(axes) => {
-  navigator.getGamepads = () => [null, { index: 1, connected: true, axes, buttons: [] }, null, null];
-}"""
-
-
-#: How far the first target goes along x in so many pictures, by a clock that stands between them: that of the
-#: machine, which may be busy, is another matter.
-GONE = """([apart, count]) => new Promise((done) => {
-  let now = performance.now();
-  performance.now = () => now;
-  const x = () => nmm.drive.targets[0].value[0];
-  const wait = (left, then) => requestAnimationFrame(() => (left ? wait(left - 1, then) : then()));
-  const go = (k, x0) => {
-    if (k === count) {
-      delete performance.now;
-      return done(x() - x0);
-    }
-    now += apart;
-    requestAnimationFrame(() => go(k + 1, x0));
-  };
-  wait(2, () => go(0, x()));
-})"""
-
-
-def test_a_gamepad_moves_the_target(window: Window, setup: ScenarioSetup) -> None:
-    with driven(setup) as url:
-        page = opened(window, url)
-        for axes, row, sign in (
-            ([0.9, 0.0, 0.0, 0.0], 0, 1), ([-0.9, 0.0, 0.0, 0.0], 0, -1),
-            ([0.0, -0.9, 0.0, 0.0], 1, 1), ([0.0, 0.9, 0.0, 0.0], 1, -1),
-            ([0.0, 0.0, 0.0, -0.9], 2, 1), ([0.0, 0.0, 0.0, 0.9], 2, -1),
-        ):  # fmt: skip
-            before = target(page)
-            page.evaluate(GAMEPAD, axes)
-            page.wait_for_function(f"Math.abs(nmm.drive.targets[0].value[{row}] - {before[row]}) > 0.01")
-            page.evaluate(GAMEPAD, [0.0, 0.0, 0.0, 0.0])
-            change = target(page) - before
-            assert change[row] * sign > 0.0
-            assert np.count_nonzero(change) == 1
-        # A stick that is let go of is never quite at 0; without sticks, or pads, nothing goes wrong.
-        page.wait_for_function("nmm.drive.targets[0].awaited === undefined", timeout=1000.0 * MOST)
-        rest = target(page)
-        for pad in (
-            f"({GAMEPAD})([0.05, -0.1, 0.11, 0.1])",
-            f"({GAMEPAD})([])",
-            "navigator.getGamepads = () => []",
-        ):
-            page.evaluate(f"() => {{ {pad} }}")
-            draw_frames(page)
-            np.testing.assert_array_equal(target(page), rest)
-        # Half pushed it is half as fast: speed is that of the stick, whatever the rate of pictures.
-        reach = page.evaluate("nmm.drive.targets[0].reach")
-        for push, apart in ((0.4, 10.0), (0.8, 10.0), (0.8, 90.0)):
-            page.evaluate(GAMEPAD, [push, 0.0, 0.0, 0.0])
-            gone = page.evaluate(GONE, [apart, 20])
-            assert gone == pytest.approx(20 * 0.5 * reach * push * 1e-3 * apart, rel=1e-9)
-        # What was held up for long does not leap.
-        assert page.evaluate(GONE, [2000.0, 3]) == pytest.approx(3 * 0.5 * reach * push * 0.1, rel=1e-9)
 
 
 def test_pictures_come_at_their_rate(window: Window, setup: ScenarioSetup) -> None:

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import page_of, refused
+from live_loop import Loop, scenario
 from ports import MOST, listening, wait_for
 from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.ioloop import IOLoop
@@ -28,9 +29,10 @@ from nmm.base.errors import InputError, RunError, ScenarioError
 from nmm.base.kinds import RESOLVERS
 from nmm.model.robots.configuration import Configuration
 from nmm.plugins.live.driving.driven import Driven, TargetProgress
+from nmm.plugins.live.driving.messages import Aim, Order, Pick, parsed
 from nmm.plugins.live.driving.planning import Planning, later
-from nmm.plugins.live.driving.session import Aim, DriveSession, Order, Pick, parsed
-from nmm.plugins.live.driving.setups import DriveSetup, RobotSetup, ScenarioSetup, Settings
+from nmm.plugins.live.driving.session import DriveSession
+from nmm.plugins.live.driving.setups import RobotSetup, ScenarioSetup, Settings
 from nmm.views.playback.rolling import Rolling
 
 KINDS = ("rg", "pg", "ej", "dls")
@@ -40,10 +42,6 @@ KINDS = ("rg", "pg", "ej", "dls")
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Plans are looked for as long as a busy machine needs."""
     monkeypatch.setattr("nmm.plugins.live.driving.planning.SECONDS", MOST)
-
-
-def scenario(name: str = "unicycle_3r_position") -> ScenarioSetup:
-    return ScenarioSetup(nmm.Scenario.load(name))
 
 
 def ee(driven: Driven) -> np.ndarray:
@@ -440,25 +438,6 @@ def test_what_goes_wrong_with_a_plan_is_told_and_the_loop_goes_on(monkeypatch: p
 
 
 # the loop
-
-
-class Loop:
-    """A session, and what a page would be told."""
-
-    def __init__(self, setup: DriveSetup) -> None:
-        self.session = DriveSession(Driven(setup))
-        self.latest = self.session.follow()
-
-    def __enter__(self) -> Loop:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.session.close()
-        assert self.session._thread is not None
-        assert not self.session._thread.is_alive()
-
-    def picture(self) -> dict[str, object]:
-        return json.loads(self.latest().splitlines()[-1])
 
 
 def test_a_hostile_message_changes_nothing() -> None:

@@ -2,6 +2,7 @@
 
 import math
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -167,11 +168,22 @@ class Driven:
             self.things[task - len(self.targets)].drag(value, self.t)
         self.trouble = ""
 
+    @property
+    def seen(self) -> Array:
+        """q (n,) as the controller sees it: by odometry, say."""
+        return self.q if self._plant is None else self._plant.see(self.q)
+
+    def targets_here(self, numbers: Iterable[int]) -> None:
+        """Put the targets of these tasks where they are now, as the controller sees it."""
+        configuration = Configuration(self.robot, self.seen)
+        for number in numbers:
+            function = self.reacting.given.task.tasks[number].function
+            self.targets[number].signal.set(evaluate(function, 0.0, configuration).value)
+
     def aim_here(self) -> None:
         """Aim each task at the value that it has now."""
-        configuration = Configuration(self.robot, self.q)
-        for number, task in enumerate(self.reacting.given.task):
-            self.aim(number, evaluate(task.function, 0.0, configuration).value)
+        self.targets_here(range(len(self.targets)))
+        self.trouble = ""
 
     def with_choice(self, key: str, value: object) -> PendingController:
         """A controller with that choice, for `use`; made apart, as it may take longer than a step. `NmmError`

@@ -5,23 +5,24 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import asdict
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import numpy as np
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
-from pydantic.dataclasses import dataclass
 
 from nmm.base.arrays import finite
 from nmm.base.errors import InputError, NmmError
 from nmm.base.resolver_style import looks
+from nmm.control.controller import Controller
 from nmm.model.robots.motion import Camera
 from nmm.motion.components import Axes
 from nmm.motion.seen import SeenPoints
 from nmm.plugins.live.driving.driven import Driven, DrivenState, PendingController
+from nmm.plugins.live.driving.jogging import Jogging
+from nmm.plugins.live.driving.messages import FAR, Aim, Jog, Order, Pick, parsed
 from nmm.plugins.live.driving.planning import NO_PLAN, Planning, later, why
 from nmm.plugins.live.driving.setups import Choice, DriveSetup, named
 from nmm.plugins.live.server import Visitor
@@ -34,64 +35,20 @@ from nmm.views.playback.drawing import Drawing, encode
 KEPT = int(30 * FPS)
 #: Messages that wait for the loop at most; more are dropped.
 WAITING = 256
+SCRIPTS = ("drive_gizmo.js", "drive_border.js", "drive_choices.js", "drive.js", "jog_devices.js", "jog.js")
 #: How long a notice is shown, s.
 NOTICE = 5.0
-#: Targets are at most this far away, m or rad.
-FAR = 1e4
-#: The longest message, bytes.
-LONGEST = 2048
-
-_STRICT = ConfigDict(strict=True, extra="forbid")
-_Place = Annotated[float, Field(ge=-FAR, le=FAR)]
-
-
-@dataclass(frozen=True, config=_STRICT)
-class Aim:
-    """Put the target of task number `task` at `value` (s,); pictures that know of it carry its `number`."""
-
-    task: Annotated[int, Field(ge=0, lt=1000)]
-    value: Annotated[tuple[_Place, ...], Field(min_length=1, max_length=100)]
-    number: Annotated[int, Field(ge=0, lt=2**53)] = 0
-    type: Literal["aim"] = "aim"
-
-
-@dataclass(frozen=True, config=_STRICT)
-class Pick:
-    key: str
-    value: str | bool | float
-    type: Literal["pick"] = "pick"
-
-
-@dataclass(frozen=True, config=_STRICT)
-class Order:
-    what: Literal["pause", "go", "restart", "here", "plan", "react"]
-    type: Literal["order"] = "order"
-
-
-Message = Aim | Pick | Order
-_MESSAGES: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
-
-
-def parsed(text: str | bytes) -> Message:
-    """A page's message; `InputError` for anything that our pages do not send."""
-    if len(text) > LONGEST:
-        raise InputError(where="message", expected=f"at most {LONGEST} bytes", got=len(text))
-    try:
-        return _MESSAGES.validate_json(text)
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False)[0]
-        place = " ".join(map(str, first["loc"]))
-        raise InputError(first["msg"], where=f"message {place}".rstrip()) from None
 
 
 def drive(
     setup: DriveSetup,
     *,
+    jog_speeds: Mapping[str, float] | None = None,
     port: int | None = None,
     open_browser: bool = True,
     stop: threading.Event | None = None,
 ) -> None:
-    """Let a robot follow targets that are dragged in a browser; returns at Ctrl-C or when `stop` is set.
+    """Let a robot follow targets that are dragged in a browser, or jog it; until Ctrl-C, or `stop` is set.
 
     The address is printed. Only this machine can reach it, and only pages that this program has sent may send
     messages, which are checked. All pages show and move the same robot.
@@ -99,13 +56,17 @@ def drive(
     Parameters
     ----------
     setup : what is driven
+    jog_speeds : of full keys and sticks, by name: "linear", m/s, and "angular", rad/s, of the hand, and the
+        platform's inputs; when not given 0.25 m/s and 0.5 rad/s, or less for a slower robot; the page changes
+        them
     port : port on 127.0.0.1; a free one when not given
     open_browser : whether to open the page in the user's browser
     stop : ends it when set (by another thread)
 
     Raises
     ------
-    InputError : the port is taken, not allowed or not a port; a scenario that cannot be driven
+    InputError : the port is taken, not allowed or not a port; a scenario that cannot be driven; a speed of
+        what is not there, or above the robot's own limit
 
     Examples
     --------
@@ -116,7 +77,7 @@ def drive(
     >>> nmm.driving.drive(setup, open_browser=False, stop=ended)
     Driving at http://127.0.0.1:.../ (Ctrl-C ends it)
     """
-    session = DriveSession(Driven(setup), port=port)
+    session = DriveSession(Driven(setup), jog_speeds, port=port)
     session.serve("Driving", [setup.robot], open_browser=open_browser, stop=stop)
 
 
@@ -125,21 +86,24 @@ class DriveSession(RobotSession):
     (`receive`, `follow`), and one that makes a controller or a plan. They share what is written in one go: a
     deque, and references to values that never change."""
 
-    def __init__(self, driven: Driven, *, port: int | None = None) -> None:
-        self._driven = driven
+    def __init__(
+        self, driven: Driven, jog_speeds: Mapping[str, float] | None = None, *, port: int | None = None
+    ) -> None:
+        self._driven, self._jogging = driven, Jogging(driven, jog_speeds)
         self._look = look = driven.look()
-        self._waiting: deque[Message] = deque(maxlen=WAITING)
+        self._waiting: deque[Aim | Pick | Order] = deque(maxlen=WAITING)
         self._aimed = threading.Event()
         self._samples: deque[tuple[int, list[float | None]]] = deque(maxlen=KEPT)
         self._picks: dict[str, object] = {}
         #: The number of the last aim that each task's target has had.
         self._heard: dict[int, int] = {}
-        self._making: Future[PendingController] | None = None
+        self._making: Future[tuple[PendingController, Controller]] | None = None
         self._paused = False
         self._notice, self._until = "", 0.0
         self._count = 0
         self._planning, self._plan = Planning(driven), (0, "")
-        self._choices: tuple[int, list[Choice]] = (0, driven.choices)
+        self._choices: tuple[int, list[Choice]] = (0, [])
+        self._offer()
         self._picture: tuple[list[str], dict[str, Any]] | None = None
         first = driven.reacting
         self._seen = SeenPoints(first.given.task, first.limits, driven.robot, live=True)
@@ -156,6 +120,7 @@ class DriveSession(RobotSession):
             reach=float(driven.robot.reach),
             far=FAR,
         )
+        targets.add("jog", **self._jogging.for_page())
         names, units = zip(*(row for target in driven.targets for row in target.rows), strict=True)
         hidden = {"residual", "u_dot", "drift"} | (
             set() if driven.has_objective else {"objective"}
@@ -164,14 +129,14 @@ class DriveSession(RobotSession):
         super().__init__(
             driven.shown,
             driven.setup.name,
-            lambda: Visitor(self.follow(), self.receive),
+            self._visit,
             obstacles=driven.obstacles,
             surroundings=driven.setup.surroundings,
             channels=channels,
             look=looks([_kind(driven.choices)])[0],
             cameras=self._cameras(look),
             further=targets.commands,
-            scripts=("drive_gizmo.js", "drive_border.js", "drive_choices.js", "drive.js"),
+            scripts=SCRIPTS,
             styles=("drive.css",),
             port=port,
         )
@@ -205,12 +170,25 @@ class DriveSession(RobotSession):
         self._aimed.set()  # the loop waits for that, too
         super().close()
 
-    def receive(self, text: str | bytes) -> bool:
+    def _visit(self) -> Visitor:
+        """A new page; what it holds is let go of when it is gone."""
+        page = object()
+
+        def gone() -> None:
+            self._jogging.gone(page)
+            self._aimed.set()
+
+        return Visitor(self.follow(), lambda text: self.receive(text, page), gone)
+
+    def receive(self, text: str | bytes, page: object = None) -> bool:
         """Queue a page's message for the loop, ignoring invalid ones. False: there is no answer."""
         with suppress(InputError):
             heard = parsed(text)
-            self._waiting.append(heard)
-            if isinstance(heard, Aim):
+            if isinstance(heard, Jog):
+                self._jogging.hear(heard, page)
+            else:
+                self._waiting.append(heard)
+            if isinstance(heard, Aim | Jog):
                 self._aimed.set()
         return False
 
@@ -249,7 +227,10 @@ class DriveSession(RobotSession):
             passed = self.clock.passed()
             owed = 0.0 if self._paused or driven.trouble else owed + passed
             try:
-                while owed >= dt and driven.step():
+                while owed >= dt:
+                    self._jogging.prepare()
+                    if not driven.step():
+                        break
                     owed -= dt
                 self._look = driven.look()
             except (Exception, SystemExit) as error:  # a user's function may raise whatever it likes
@@ -276,40 +257,37 @@ class DriveSession(RobotSession):
             placed, picture = self._picture
             self._picture = placed, {**picture, "told": self._notice, "wrong": True}
 
+    def _offer(self) -> None:
+        """Tell the pages what may be chosen; one whose choice was refused shows the present one again."""
+        self._choices = self._choices[0] + 1, [*self._driven.choices, *self._jogging.choices]
+
     def _attend(self) -> None:
         while self._waiting:
             message = self._waiting.popleft()
-            try:
-                if isinstance(message, Aim):
-                    self._heard[message.task] = message.number
-                    self._driven.aim(message.task, np.array(message.value))
-                    self._planning.aims(message.task)
-                elif isinstance(message, Pick):
-                    self._picks[message.key] = message.value
-                elif message.what == "restart":
-                    self._driven.restart()
-                    self._planning.begin_again()
-                elif message.what == "here":
-                    self._driven.aim_here()
-                elif message.what in ("plan", "react"):
-                    self._planning.turn(message.what == "plan")
-                else:
-                    self._paused = message.what == "pause"
-            except NmmError:
-                continue  # no page of ours has that task; what has no value is not aimed at
+            with suppress(NmmError):  # no page of ours has that task; what has no value is not aimed at
+                self._take(message)
         if self._making is not None and self._making.done():
             try:
-                self._driven.use(self._making.result())
+                made, standing = self._making.result()
+                self._driven.use(made)
                 self._planning.begin_again()
+                self._jogging.renew(standing)
             except Exception as error:
                 self._note(error)
             self._making = None
-            # A page whose choice was refused shows the present one again.
-            self._choices = (self._choices[0] + 1, self._driven.choices)
+            self._offer()
         if self._picks and self._making is None:
             key = next(iter(self._picks))
             value = self._picks.pop(key)
-            self._making = later(lambda: _made(self._driven, key, value))
+            self._making = later(lambda: self._made(key, value))
+        self._jogging.paused = self._paused
+        jog = self._jogging.wanted
+        if self._planning.on and jog is not None:  # who holds on moves it, not a plan
+            self._planning.turn(False)
+        try:
+            self._jogging.attend(jog)
+        except Exception as error:
+            self._note(error)
         try:
             self._planning.attend()
             if self._plan[0] != self._planning.number:
@@ -319,6 +297,45 @@ class DriveSession(RobotSession):
             self._planning.turn(False)
             self._plan = self._planning.number, encode(NO_PLAN)
             self._note(error)
+
+    def _made(self, key: str, value: object) -> tuple[PendingController, Controller]:
+        """A controller for a choice, and one that stands by its limits; a resolver new to this machine has to
+        be compiled."""
+        driven = self._driven
+        made = driven.with_choice(key, value)
+        with suppress(NmmError):  # the loop meets it again, and reports it
+            made.controller.step(driven.t, driven.q, driven.setup.dt)  # the first call compiles
+        made.controller.reset()
+        return made, self._jogging.standing(made.controller)
+
+    def _take(self, message: Aim | Pick | Order) -> None:
+        """Do what a page says; `NmmError` for what cannot be."""
+        if isinstance(message, Aim):
+            self._heard[message.task] = (
+                message.number
+            )  # also of what cannot be aimed at: no page waits for it
+            self._driven.aim(message.task, np.array(message.value))
+            self._jogging.leave()
+            self._planning.aims(message.task)
+        elif isinstance(message, Pick):
+            if message.key.startswith("jog."):
+                try:
+                    self._jogging.choose(message.key, message.value)
+                finally:
+                    self._offer()
+            else:
+                self._picks[message.key] = message.value
+        elif message.what in ("pause", "go"):
+            self._paused = message.what == "pause"
+        else:
+            self._jogging.leave()
+            if message.what == "restart":
+                self._driven.restart()
+                self._planning.begin_again()
+            elif message.what == "here":
+                self._driven.aim_here()
+            else:
+                self._planning.turn(message.what == "plan")
 
     def _publish(self, look: DrivenState) -> None:
         driven = self._driven
@@ -334,6 +351,8 @@ class DriveSession(RobotSession):
             "at": finite(look.at),
             "paused": self._paused,
             "plans": self._planning.on,
+            "jogs": self._jogging.part,
+            "base": self._jogging.base_axes,
             "told": text,
             "wrong": wrong,
         }
@@ -359,6 +378,8 @@ class DriveSession(RobotSession):
         if self._planning.on:
             text, wrong = self._planning.words()
             return f"t = {look.t:.1f} s. {text}." if not wrong else text, wrong
+        if jogged := self._jogging.words():
+            return f"t = {look.t:.1f} s, {jogged}.", False
         if look.against:
             return f"{look.against[0].upper()}{look.against[1:]}.", True
         parts = [f"t = {look.t:.1f} s"]
@@ -367,15 +388,6 @@ class DriveSession(RobotSession):
         if self.clock.lost:
             parts.append(f"{self.clock.lost / FPS:.1f} s of real time skipped: the machine was busy")
         return ", ".join(parts), False
-
-
-def _made(driven: Driven, key: str, value: object) -> PendingController:
-    """A controller for a choice; a resolver new to this machine has to be compiled."""
-    made = driven.with_choice(key, value)
-    with suppress(NmmError):  # the loop meets it again, and reports it
-        made.controller.step(driven.t, driven.q, driven.setup.dt)  # the first call compiles
-    made.controller.reset()
-    return made
 
 
 def _kind(choices: Sequence[Choice]) -> str:

@@ -6,7 +6,7 @@
   const drive = (nmm.drive = { targets: [], active: 0, time: 0, paused: false, plan: false, tree: false, grown: true, followed: 0 });
   const panel = document.createElement("div");
   const parts = {};
-  let [drawn, axes, polled] = [0, [], null];
+  let [drawn, axes] = [0, []];
   panel.id = "drive";
   document.getElementById("plots").prepend(panel);
   document.body.classList.add("drive");
@@ -63,7 +63,6 @@
   function flush() {
     requestAnimationFrame(flush);
     if (aimed.size) tell();
-    stick();
     nmm.border.update(drive.targets);
   }
   requestAnimationFrame(flush);
@@ -140,7 +139,7 @@
     drive.active = Math.max(0, drive.targets.findIndex((target) => Object.keys(target.axes).length));
     nmm.element(panel, "div", { id: "choices" });
     const ways = [
-      [drive.targets.some((target) => Object.keys(target.axes).length), "Drag the red ball (Shift: up and down) or an arrow; or arrow keys, Page Up and Page Down, a gamepad's sticks."],
+      [drive.targets.some((target) => Object.keys(target.axes).length), "Drag the red ball (Shift: up and down) or an arrow; or arrow keys, Page Up and Page Down."],
       [drive.targets.some((target) => target.rotation.length), "Drag a ring to turn."],
       [true, "T brings the targets to where the robot is."],
       [goals.some((some) => some.length), "Drag a cross in the camera's picture."],
@@ -249,10 +248,10 @@
     if (drive.plan) drive.followed += 1;
   };
 
-  nmm.hooks.drive = ({ t, targets, heard: known, at, samples, paused, plans, told, wrong }) => {
+  nmm.hooks.drive = ({ t, targets, heard: known, at, samples, paused, plans, jogs, told, wrong }) => {
     hear();
     remember(samples);
-    drive.plans = plans;
+    Object.assign(drive, { plans, jogs });
     parts.plan.setAttribute("aria-pressed", String(plans));
     drive.time = t;
     drive.paused = paused;
@@ -281,7 +280,7 @@
     }
   };
 
-  // Keys and sticks move the target that was moved last.
+  // Keys move the target that was moved last.
   function shift(way, by) {
     const target = drive.targets[drive.active];
     const k = target && target.axes[way];
@@ -302,15 +301,4 @@
     n: () => order(drive.plans ? "react" : "plan"),
   });
   for (const key of ["End", "+", "-", "0", "l"]) delete nmm.keys[key];
-
-  function stick() {
-    const now = performance.now();
-    const passed = polled === null ? 0 : Math.min((now - polled) / 1000, 0.1);
-    polled = now;
-    const pad = navigator.getGamepads ? [...navigator.getGamepads()].find(Boolean) : undefined;
-    if (!pad || !drive.targets.length) return;
-    const speed = 0.5 * drive.targets[0].reach * passed;
-    const pushed = (k) => (Math.abs(pad.axes[k] || 0) > 0.12 ? pad.axes[k] : 0);
-    for (const [way, by] of [["x", pushed(0)], ["y", -pushed(1)], ["z", -pushed(3)]]) if (by) shift(way, by * speed);
-  }
 }

@@ -15,7 +15,7 @@
       const groups = new Map();
       for (const choice of choices) {
         if (!groups.has(choice.group)) {
-          const part = nmm.element(all, "details", choice.group.startsWith("Weights") ? {} : { open: "" });
+          const part = nmm.element(all, "details", /^(Weights|Jog)/.test(choice.group) ? {} : { open: "" });
           nmm.element(part, "summary", {}, choice.group);
           groups.set(choice.group, part);
         }

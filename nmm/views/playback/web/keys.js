@@ -46,10 +46,11 @@
     "keydown",
     (event) => {
       const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
-      if (event.ctrlKey || event.metaKey || event.altKey || keys[key] === undefined || !nmm.stage) return;
-      if (owns(event.target, key)) return;
+      if (event.ctrlKey || event.metaKey || event.altKey || !nmm.stage || owns(event.target, key)) return;
+      const taken = nmm.devices?.takes(event); // by what one holds
+      if (!taken && keys[key] === undefined) return;
       event.preventDefault();
-      keys[key](event);
+      if (!taken) keys[key](event);
     },
     true,
   );

@@ -1,5 +1,5 @@
 // Plots of one's own: several quantities in one, over time or over another quantity. They are in the address, as
-// plot=u_v,u_omega, or plot=y~x for y over x.
+// plot=u_v,u_omega, or plot=y~x for y over x; plot=u_v~~log and plot=y~x~log on a logarithmic axis.
 "use strict";
 {
   const { plots } = nmm;
@@ -10,9 +10,9 @@
   const quantity = (key) => nmm.lanes.find((lane) => lane.key === key);
   let made = 0;
 
-  own.add = (keys = [], over = "") => {
+  own.add = (keys = [], over = "", logarithmic = false) => {
     const id = `own-${(made += 1)}`;
-    const lane = { signals: [], over: "", log: false, height: HIGH.time };
+    const lane = { signals: [], over: "", log: logarithmic, height: HIGH.time };
     const panel = plots.add({ id, title: "", open: true, own: true, lanes: [lane] });
     panel.summary.replaceChildren();
     panel.heading = nmm.element(panel.summary, "span");
@@ -27,9 +27,11 @@
     const away = nmm.element(row, "button", { type: "button", title: "Take this plot away", "aria-label": "Take this plot away" }, "×");
     more.addEventListener("change", () => set(panel, [...names(lane), more.value], lane.over));
     across.addEventListener("change", () => set(panel, names(lane), across.value));
+    log.checked = logarithmic;
     log.addEventListener("change", () => {
       Object.assign(lane, { log: log.checked, zoom: null });
       draw(panel);
+      changed();
     });
     away.addEventListener("click", () => {
       plots.panels.splice(plots.panels.indexOf(panel), 1);
@@ -123,16 +125,16 @@
   own.text = () =>
     plots.panels
       .filter((panel) => panel.own && panel.lanes[0].signals.length)
-      .map(({ lanes: [{ signals, over }] }) => [over, signals.map(({ key }) => encodeURIComponent(key)).join(",")])
-      .map(([over, keys]) => `plot=${keys}${over && `~${encodeURIComponent(over)}`}`);
+      .map(({ lanes: [{ signals, over, log }] }) => [signals.map(({ key }) => encodeURIComponent(key)).join(","), encodeURIComponent(over), log ? "log" : ""])
+      .map((parts) => `plot=${parts.join("~").replace(/~+$/, "")}`);
 
   // Those that an address names take the place of those that there are.
   own.read = (texts) => {
     for (const panel of plots.panels.filter((panel) => panel.own)) panel.part.remove();
     plots.panels = plots.panels.filter((panel) => !panel.own);
     for (const text of texts) {
-      const [keys, over = ""] = text.split("~");
-      if (keys.split(",").some(quantity)) own.add(keys.split(","), over);
+      const [keys, over = "", log = ""] = text.split("~");
+      if (keys.split(",").some(quantity)) own.add(keys.split(","), over, log === "log");
     }
   };
 
