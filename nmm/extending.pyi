@@ -31,10 +31,12 @@ from .base.kernels.records import At as At
 from .base.kernels.records import Frames as Frames
 from .base.kernels.records import Rows as Rows
 from .base.kernels.rotations import exp3 as exp3
+from .base.kernels.rotations import left_jacobian_inverse3 as left_jacobian_inverse3
 from .base.kernels.rotations import log3 as log3
 from .base.kernels.spectra import spectra as spectra
 from .base.kernels.spectra import write_spectrum as write_spectrum
 from .base.kernels.velocity_map import place_mimic_joints as place_mimic_joints
+from .base.plugins import Beside as Beside
 from .base.plugins import OptionGroup as OptionGroup
 from .base.plugins import Plugin as Plugin
 from .control.directions import SMALL_PART as SMALL_PART
@@ -226,6 +228,8 @@ from .motion.verdict import Awaited as Awaited
 from .motion.verdict import FindingLine as FindingLine
 from .motion.verdict import Verdict as Verdict
 from .motion.verdict import verdict_of as verdict_of
+from .plugins.robot.calibration.judged import HeldOut as HeldOut
+from .plugins.robot.calibration.model import DriveNoise as DriveNoise
 from .plugins.sweeps import SweepResult as SweepResult
 from .plugins.sweeps.rollout import Rollouts as Rollouts
 from .scenario.keys import at as at

@@ -199,6 +199,7 @@ NOT_RUN = {
     "bad_arm.urdf": "the reader's own file",
     "view ": "waits for a browser: tests/views/test_view_task.py",
     "drive ": "waits for a browser: tests/plugins/live/test_driving.py",
+    "--stream": "waits for a viewer: tests/plugins/streams/test_stream_cli.py",
     "--play": "waits for a browser: tests/scenario/test_bundled_scenarios.py runs the scenarios",
 }
 #: Pages whose commands are run elsewhere.

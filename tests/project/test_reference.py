@@ -107,6 +107,8 @@ INNER = {
 IN_THE_PLACE = {"Distances", "Recorder", "Definition"}
 #: Types that have a name in `nmm.extending`, for packages above the wall, and no place in the reference.
 ABOVE_THE_WALL = {
+    "HeldOut",
+    "DriveNoise",
     "Awaited",
     "Plant",
     "RunCamera",

@@ -18,7 +18,10 @@ CORE = (
     "nmm.base.kernels", "nmm.model", "nmm.control", "nmm.motion", "nmm.plugins.planning", "nmm.plugins.robot",
 )  # fmt: skip
 #: What uses trajectories in a room that makes them.
-USERS = ("nmm.motion.diagnosis", "nmm.plugins.planning.cli", "nmm.plugins.robot.cli", "nmm.plugins.robot.ros")
+USERS = (
+    "nmm.motion.diagnosis", "nmm.plugins.planning.cli", "nmm.plugins.robot.cli", "nmm.plugins.robot.lerobot",
+    "nmm.plugins.robot.ros",
+)  # fmt: skip
 #: What wings import besides, with the reason.
 EXCEPTIONS = {
     ("nmm.control.step.equations", "call_step"): "the linearised step, compiled",

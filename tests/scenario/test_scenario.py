@@ -235,7 +235,7 @@ def test_a_task_alone_is_the_first_of_a_list(tmp_path: Path) -> None:
     assert given.resolved()["objective"]["terms"][1]["weight"] == 2.0
     with refused("alone.yaml: set task.gian", got="gian", kind=ScenarioError):
         Scenario.load(str(file), {"task.0.gian": 4})
-    with refused("alone.yaml:59: task.1, with task.1.gain set", got="1", kind=ScenarioError):
+    with refused("alone.yaml:60: task.1, with task.1.gain set", got="1", kind=ScenarioError):
         Scenario.load(str(file), {"task.1.gain": 4})
 
 
@@ -338,6 +338,7 @@ def test_resolved_holds_every_default_as_plain_data() -> None:
     assert data["resolver"]["threshold"] == 0.01
     assert data["robot"] == {
         "source": "unicycle_2r",
+        "calibration": None,
         "arguments": {},
         "platform": None,
         "package_dirs": [],
