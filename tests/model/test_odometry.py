@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from gripping import folding, hitched
+from helpers.bundled_bases import BASES
 from places import PANDA, ROOT
 from scipy.integrate import solve_ivp
 
@@ -23,15 +24,7 @@ from nmm.model.robots.robot import Robot
 from nmm.model.robots.wheel_rates import wheel_rates, wheel_shares
 
 CASES: dict[str, dict[str, str]] = {
-    "differential_base": {},
-    "differential_base as a unicycle": {"platform": "unicycle"},
-    "differential_base by its wheels": {"platform": "wheeled"},
-    "car_base": {},
-    "car_base with front drive": {"platform": "front_drive_car"},
-    "trailer_base": {},
-    "trailer_base by its wheels": {"platform": "wheeled"},
-    "omni_base": {},
-    "omni_base with skid steering": {"platform": "skid_steer"},
+    **BASES,
     "unicycle_2r": {},
 }
 Readings = dict[str, float]

@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from ackermann_car import car
+from helpers.bundled_bases import BASES
 from places import ROOT
 from rolling_law import base as on_base
 from rolling_law import wheel
@@ -29,16 +30,8 @@ from nmm.plugins.robot.odometry import Counters, counted_wheels
 from nmm.views.playback.placements import rolling_joints
 
 CASES: dict[str, dict[str, str]] = {
-    "differential_base": {},
-    "differential_base as a unicycle": {"platform": "unicycle"},
-    "differential_base by its wheels": {"platform": "wheeled"},
-    "car_base": {},
-    "car_base with front drive": {"platform": "front_drive_car"},
+    **BASES,
     "car_base by its wheels": {"platform": "wheeled"},
-    "trailer_base": {},
-    "trailer_base by its wheels": {"platform": "wheeled"},
-    "omni_base": {},
-    "omni_base with skid steering": {"platform": "skid_steer"},
     "unicycle_2r": {},
     "kiwi": {},
     "kiwi by its wheels": {"platform": "kiwi by its wheels"},

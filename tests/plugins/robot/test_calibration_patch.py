@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import trimesh
 from ackermann_car import car
+from helpers.bundled_bases import BASES
 from places import DATA
 from rolling_law import base as on_base
 from rolling_law import turns, wheel
@@ -27,16 +28,8 @@ from nmm.plugins.robot.calibration.text_edits import XmlText, unified_diff
 
 #: Bundled robots as URDF, with what they are loaded as; and URDF texts.
 CASES: dict[str, dict[str, str]] = {
-    "differential_base": {},
-    "differential_base as a unicycle": {"platform": "unicycle"},
-    "differential_base by its wheels": {"platform": "wheeled"},
-    "car_base": {},
-    "car_base with front drive": {"platform": "front_drive_car"},
+    **BASES,
     "car_base by its wheels": {"platform": "wheeled"},
-    "trailer_base": {},
-    "trailer_base by its wheels": {"platform": "wheeled"},
-    "omni_base": {},
-    "omni_base with skid steering": {"platform": "skid_steer"},
     "unicycle_3r": {},
     "kiwi": {"platform": "omnidirectional"},
     "ackermann": {},
