@@ -311,9 +311,8 @@ class DriveSession(RobotSession):
     def _take(self, message: Aim | Pick | Order) -> None:
         """Do what a page says; `NmmError` for what cannot be."""
         if isinstance(message, Aim):
-            self._heard[message.task] = (
-                message.number
-            )  # also of what cannot be aimed at: no page waits for it
+            # also of a value that is refused: no page waits for it
+            self._heard[message.task] = message.number
             self._driven.aim(message.task, np.array(message.value))
             self._jogging.leave()
             self._planning.aims(message.task)
