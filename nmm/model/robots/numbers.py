@@ -55,17 +55,18 @@ class RobotNumber:
 def robot_numbers(robot: Robot) -> dict[str, RobotNumber]:
     """A robot's numbers that say how it moves by what its wheels and joints turn, by name, in a fixed order:
 
-    radius.<joint> : of each wheel whose turning the platform's motion determines, m (`radius`: of all, where
-        the file shows no wheels)
-    track : from the wheels at the right to those at the left, where these roll ahead and do not steer, m
-    wheelbase : from the axle to the steered wheel, or to the mean of several, m
-    half_length_plus_width : of mecanum wheels, half the sum of length and width, m
-    wheel_distance : mean distance of other wheels from the reference point, m
-    left, right, ahead : y, y and x of skid-steering's centres of rotation, m
-    H, L, or H1, L1, ... : of a tractor's trailers as in its formulas: hitch behind the axle in front, and
-        from hitch to axle, m; of a platform described by its wheels hitch.<joint> and length.<joint>
-    offset.<joint>, ratio.<joint> : rad and 1; of a steering angle: coordinate = ratio * reading + offset, the
-        reading with the sign that the coordinate has
+    - ``radius.<joint>``, of each wheel whose turning the platform's motion determines, m (``radius``, of all,
+      where the file shows no wheels)
+    - ``track``, from the wheels at the right to those at the left, where these roll ahead and do not steer, m
+    - ``wheelbase``, from the axle to the steered wheel, or to the mean of several, m
+    - ``half_length_plus_width``, of mecanum wheels, half the sum of length and width, m
+    - ``wheel_distance``, mean distance of other wheels from the reference point, m
+    - ``left``, ``right``, ``ahead``: y, y and x of skid-steering's centres of rotation, m
+    - ``H``, ``L``, or ``H1``, ``L1``, ... of a tractor's trailers as in its formulas: hitch behind the axle
+      in front, and from hitch to axle, m; of a platform described by its wheels ``hitch.<joint>`` and
+      ``length.<joint>``
+    - ``offset.<joint>``, ``ratio.<joint>``, rad and 1, of a steering angle: coordinate = ratio * reading +
+      offset, the reading with the sign that the coordinate has
 
     Raises
     ------
