@@ -251,12 +251,13 @@ class DivergedError(RunError):
     """
 
 
-def shown(value: object) -> str:
-    """A value as an error shows it: floats short, arrays by shape and first values, on one line."""
+def shown(value: object, deep: int = 3) -> str:
+    """A value as an error shows it: floats short, arrays by shape and first values, on one line; lists in
+    lists so deep, since a list may hold itself."""
     if isinstance(value, float):
         return f"{value:g}"
-    if isinstance(value, list | tuple) and 0 < len(value) < FIRST:
-        inner = ", ".join(shown(item) for item in value)
+    if isinstance(value, list | tuple) and 0 < len(value) < FIRST and deep:
+        inner = ", ".join(shown(item, deep - 1) for item in value)
         return f"[{inner}]" if isinstance(value, list) else f"({inner})"
     if hasattr(value, "__array_interface__"):  # NumPy's: importing it here every start would pay
         return _shown_array(value)

@@ -97,7 +97,8 @@ def _checked(entry: object, where: str) -> str:
 
 
 class Beside:
-    """What goes on beside a run, and cannot end it."""
+    """What goes on beside a run, and cannot end it: what it raises is told when the run is written, and then
+    the exit status is 1."""
 
     def watch(self, recorder: Any) -> None:
         """Called with what records the samples, as `simulate` does it."""

@@ -7,22 +7,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date as calendar
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-import numpy as np
 import yaml
 from pydantic import BeforeValidator, Field, ValidationError
 
-from nmm.base.arrays import scalar
-from nmm.base.errors import InputError, ScenarioError, expect, expect_kind, expect_known
-from nmm.base.files import read_bytes, replaceable, whole_file, written_at
-from nmm.model.robots.numbers import RobotNumber, robot_numbers, with_numbers
-from nmm.scenario.document import Document, document_of
+from nmm.base.arrays import scalar, vector
+from nmm.base.errors import InputError, expect_kind, expect_known
+from nmm.base.files import replaceable, whole_file, written_at
+from nmm.model.robots.numbers import RobotNumber, with_numbers
+from nmm.model.robots.robot import Robot
+from nmm.scenario.document import Document, document_in
 from nmm.scenario.keys import KeyedError, KeyedPart, as_written, first_error
 from nmm.scenario.numbers import Number
-
-if TYPE_CHECKING:
-    from nmm.model.robots.robot import Robot
+from nmm.scenario.plain_data import plain
 
 #: What the file calls itself.
 FORMAT = "nmm calibration 1"
@@ -61,6 +59,8 @@ class CalibrationFile:
     numbers : by name (`nmm.robot_numbers`)
     measured : what else was learned, plain data: where a reference is mounted, delays, noise, residuals
     date : of the calibration, YYYY-MM-DD; logs : names of the files, without folders
+    places : where the robot's file has the arm's joints and the frames whose numbers these are
+        (`Robot.file_places`): their nominal numbers are those of every robot
 
     Raises
     ------
@@ -82,6 +82,7 @@ class CalibrationFile:
     measured: Mapping[str, Any] = field(default_factory=dict)
     date: str = ""
     logs: tuple[str, ...] = ()
+    places: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, number in self.numbers.items():
@@ -91,6 +92,8 @@ class CalibrationFile:
             scalar(number.value, f"{where}: value")
             if not math.isnan(number.deviation):
                 scalar(number.deviation, f"{where}: deviation", least=0.0)
+        for name, place in self.places.items():
+            vector(place, 9, f"calibration of {self.robot}: places: {name}")
 
     @classmethod
     def of(
@@ -118,7 +121,7 @@ class CalibrationFile:
         InputError : as `nmm.with_numbers`; the deviation of a number without a value; measured data that is
             not plain
         """
-        numbers = robot_numbers(with_numbers(robot, values))
+        numbers = with_numbers(robot, values).numbers_named(values)
         spread = {} if deviations is None else deviations
         for name in spread:
             expect_known("number", name, values, "deviations")
@@ -135,9 +138,10 @@ class CalibrationFile:
             robot.name,
             robot.platform.name,
             learned,
-            _plain(measured or {}, "measured"),
+            plain(measured or {}, "measured"),
             calendar.today().isoformat() if date is None else date,
             tuple(Path(log).name for log in logs),
+            robot.file_places(dict.fromkeys(numbers[name].of for name in learned if _placed(numbers[name]))),
         )
 
     @classmethod
@@ -148,17 +152,21 @@ class CalibrationFile:
         ------
         InputError : no such file, no YAML, a missing or unknown key, what is no number: with file and line
         """
-        document = _read(Path(path))
+        document = document_in(path, LONGEST)
         try:
             part = _FilePart.model_validate(document.data)
         except ValidationError as error:
             raise _located(document, first_error(error, document.data)) from None
         numbers = {name: item.made() for name, item in part.numbers.items()}
         try:
-            measured = _plain(part.measured, "measured")
+            measured = plain(part.measured, "measured")
         except InputError as error:
             raise _located(document, KeyedError.of(("measured",), error)) from None
-        return cls(part.robot, part.platform, numbers, measured, part.date, tuple(part.logs))
+        places = {name: tuple(place) for name, place in part.places.items()}
+        try:
+            return cls(part.robot, part.platform, numbers, measured, part.date, tuple(part.logs), places)
+        except InputError as error:
+            raise error.at(path) from None
 
     def save(self, path: str | Path) -> Path:
         """Write it, whole or not at all.
@@ -172,8 +180,10 @@ class CalibrationFile:
         data |= {"date": self.date} if self.date else {}
         data |= {"logs": [*self.logs]} if self.logs else {}
         data["numbers"] = {name: _told(number) for name, number in self.numbers.items()}
+        if self.places:
+            data["places"] = {name: [float(part) for part in place] for name, place in self.places.items()}
         if self.measured:
-            data["measured"] = _plain(self.measured, "measured")
+            data["measured"] = plain(self.measured, "measured")
         text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
         with written_at(file), whole_file(replaceable(file)) as temporary:
             temporary.write_text(text, encoding="utf-8")
@@ -187,7 +197,8 @@ class CalibrationFile:
         InputError : it is another robot's: of another kind of platform, without one of the numbers, or with
             another nominal value (by more than a share of 1e-6), which is named with both
         """
-        own = robot_numbers(robot)
+        expect_kind(robot, Robot, "robot", "a Robot, as nmm.load gives it")
+        own = robot.numbers_named(self.numbers)
         whose = f"it is that of another robot, {self.robot}"
         if self.robot == robot.name:
             whose = f"it is that of another {self.robot}"
@@ -196,12 +207,16 @@ class CalibrationFile:
             raise InputError(whose, where=f"{where}: platform", expected=expected, got=self.platform)
         for name, number in self.numbers.items():
             if name not in own:
-                raise InputError(f"{whose}: {robot.name} has no {name}", where=where, available=[*own])
+                what = f"{whose}: {robot.name} has no {name}"
+                raise InputError(what, where=where, got=name, available=[*own])
             nominal = own[name].nominal
             if abs(number.nominal - nominal) > CLOSE * max(abs(number.nominal), abs(nominal)):
                 expected = f"a nominal {name} of {_of_unit(nominal, own[name])}, as {robot.name} has"
                 got = _of_unit(number.nominal, own[name])
                 raise InputError(f"{whose}, or its file has changed", where=where, expected=expected, got=got)
+        for name, apart in robot.apart_in_file(self.places).items():
+            if apart > CLOSE:
+                raise InputError(f"{whose}, or its file has changed: {name} is elsewhere in it", where=where)
         try:
             return with_numbers(robot, {name: number.value for name, number in self.numbers.items()})
         except InputError as error:
@@ -249,20 +264,8 @@ class _FilePart(KeyedPart):
     date: Text = ""
     logs: list[Text] = Field(default_factory=list)
     numbers: dict[str, _NumberPart]
+    places: dict[str, list[Number]] = Field(default_factory=dict)
     measured: dict[str, Any] = Field(default_factory=dict)
-
-
-def _read(path: Path) -> Document:
-    """`InputError` names the file, and the line where it is no YAML."""
-    try:
-        text = read_bytes(path, LONGEST).decode("utf-8-sig")
-        return document_of(text, str(path), path.parent)
-    except UnicodeDecodeError:
-        raise InputError(where=path, expected="UTF-8 text") from None
-    except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror or error})", where=path) from None
-    except ScenarioError as error:
-        raise error.placed(error.where, InputError) from None
 
 
 def _located(document: Document, error: KeyedError) -> InputError:
@@ -274,26 +277,9 @@ def _told(number: Calibrated) -> dict[str, float]:
     return told if math.isnan(number.deviation) else {**told, "deviation": float(number.deviation)}
 
 
-def _plain(value: Any, where: str) -> Any:
-    """Mappings by name, lists, numbers, texts, True, False and None; texts that are numbers become these."""
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item, f"{where}: {key}") for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item, where) for item in value]
-    if isinstance(value, str):
-        try:
-            number = float(value)
-        except ValueError:
-            return value
-        whole = value.strip().lstrip("+-").isdecimal()
-        return value if not math.isfinite(number) else int(value) if whole else number
-    fits = (
-        value is None or isinstance(value, bool | int) or (isinstance(value, float) and math.isfinite(value))
-    )
-    expect(fits, where, "plain data: finite numbers, texts, lists and mappings by name", value)
-    return value
+def _placed(number: RobotNumber) -> bool:
+    """Whether it is that of a joint or frame whose place in the file counts."""
+    return number.kind in ("offset", "ratio", "origin")
 
 
 def _of_unit(value: float, number: RobotNumber) -> str:

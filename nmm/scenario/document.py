@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from nmm.base.errors import ScenarioError, Setting
+from nmm.base.errors import InputError, ScenarioError, Setting, expect_kind
 from nmm.base.files import read_bytes
 from nmm.base.text_format import listed
 from nmm.scenario.keys import is_path
@@ -158,6 +158,21 @@ def read_file(path: Path) -> Document:
         what = "this is XML, as robots' files are"
         raise ScenarioError(what, where=path, expected=f"a scenario: nmm init {path} writes one for a robot")
     return document_of(text, str(path), path.resolve().parent)
+
+
+def document_in(path: str | Path, longest: int) -> Document:
+    """The document of a file that is no scenario, of so many bytes at most; `InputError` names the file, and
+    the line where it is no YAML."""
+    expect_kind(path, str | Path, "file", "a file's path")
+    file = Path(path)
+    try:
+        return document_of(read_bytes(file, longest).decode("utf-8-sig"), str(file), file.parent)
+    except UnicodeDecodeError:
+        raise InputError(where=file, expected="UTF-8 text") from None
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror or error})", where=file) from None
+    except ScenarioError as error:
+        raise error.placed(error.where, InputError) from None
 
 
 def document_of(text: str, name: str, folder: Path) -> Document:

@@ -79,6 +79,13 @@ def test_what_came_is_shown_short(value: object, text: str) -> None:
     assert shown(value) == text
 
 
+def test_a_list_that_holds_itself_is_shown() -> None:
+    itself: list[object] = []
+    itself.append(itself)
+    assert shown(itself) == "[[[[[...]]]]]"
+    assert shown([[0.12345678]]) == "[[0.123457]]"
+
+
 def test_a_stranger_s_repr_may_raise() -> None:
     class Rude:
         def __repr__(self) -> str:

@@ -24,6 +24,7 @@ from nmm.plugins.robot import bag_findings as bag
 from nmm.plugins.robot import findings as loop
 from nmm.plugins.robot.calibration import findings as calibrating
 from nmm.plugins.robot.calibration import log_findings
+from nmm.plugins.robot.calibration.arm import findings as arm
 
 PART = {"name": "q1", "t": 0.5, "value": 1.25, "unit": "rad", "lower": -1.0, "upper": 1.0}
 FLAW = {"meaning": "the task Jacobian J lost rank", "lost": ["tilt of tool about x"], "level": None}
@@ -762,4 +763,5 @@ def test_every_code_is_documented(pytestconfig: pytest.Config) -> None:
         *bag.WORDS,
         *calibrating.WORDS,
         *log_findings.WORDS,
+        *arm.WORDS,
     }

@@ -450,8 +450,9 @@ def test_robot_not_made_by_loading(robot_2r: Robot) -> None:
 # ------------------------------------------------------------------------------------------ documentation
 
 
-def test_the_pages_examples_run() -> None:
+def test_the_pages_examples_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """docs/robots.md from top to bottom."""
+    monkeypatch.chdir(tmp_path)
     page = ROOT / "docs" / "robots.md"
     names: dict[str, object] = {}
     blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL)

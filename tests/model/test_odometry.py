@@ -206,6 +206,15 @@ def test_counters_that_say_too_little_are_named() -> None:
     np.testing.assert_array_equal(odometry.q, np.zeros(3))
 
 
+def test_a_counter_that_no_robot_reaches_is_refused_without_times_too() -> None:
+    robot = nmm.load("differential_base")
+    still = {"left_wheel_joint": 0.0, "right_wheel_joint": 0.0}
+    odometry = robot.odometry(robot.rest, still)
+    with pytest.raises(InputError, match="jumped: it cannot turn so far between two readings"):
+        odometry.update(dict.fromkeys(still, 1e308))
+    assert odometry.update(dict.fromkeys(still, 10.0))[0] == pytest.approx(1.0)
+
+
 def test_a_counter_that_jumps_by_a_turn_is_refused() -> None:
     robot, names = base("differential_base"), ("left_wheel_joint", "right_wheel_joint")
     odometry = robot.odometry(robot.rest, dict.fromkeys(names, 0.0), fastest={names[1]: 15.0, names[0]: 15.0})

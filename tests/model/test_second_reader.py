@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import io
-import logging
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
 import pytest
 import yourdfpy
 from places import UR5
+from second_urdf import read_by_yourdfpy
 from thinned import thinned
 from urdf_parts import inertial, joint, link, random_tree, robot, write
 
 import nmm
 from nmm.base.bundled import bundled_robots
-from nmm.model.robots.loading.check import check_mimics, inspect
+from nmm.model.robots.loading.check import inspect
 from nmm.model.robots.loading.description import describe
 from nmm.model.robots.loading.packages import package_file
-from nmm.model.robots.loading.xml_tree import Attributes, children, parse
-from nmm.model.robots.mimic_joints import first_leaders
 
 #: Largest difference of placements, m and of rotation matrices' entries.
 SAME = 1e-6
@@ -45,24 +42,6 @@ def differing(file: Path) -> list[str]:
         return float(np.abs(ours - other.get_transform(name)).max())
 
     return [name for name in other.link_map if apart(name) > SAME]
-
-
-def read_by_yourdfpy(xml: str) -> yourdfpy.URDF:
-    """With every mimic joint by a joint that follows nobody: yourdfpy reads no chains of them."""
-    root = ElementTree.fromstring(xml)
-    found = {
-        one.joint: one
-        for one in first_leaders(check_mimics(children(parse(xml), "joint"), Attributes(), Attributes()))
-    }
-    for element in root.iterfind("joint"):
-        one, mimic = found.get(element.get("name", "")), element.find("mimic")
-        if one is not None and mimic is not None:
-            numbers = {"multiplier": repr(one.multiplier), "offset": repr(one.offset)}
-            mimic.attrib = {"joint": one.leader, **numbers}
-        elif mimic is not None:
-            element.remove(mimic)  # its leader is no joint
-    logging.getLogger("yourdfpy.urdf").setLevel(logging.ERROR)
-    return yourdfpy.URDF.load(io.BytesIO(ElementTree.tostring(root)), load_meshes=False)
 
 
 @pytest.mark.parametrize("name", sorted(bundled_robots()))

@@ -107,7 +107,7 @@ WORDS = placed(
         "left: {names:few}; angles and limits have the other sign",
         "calibrated": lambda *, numbers, **_: (
             "not as its file says: "
-            + few([f"{name} {own:g} (file: {file:g})" for name, (file, own) in numbers.items()])
+            + few([f"{name} {own:g} (file: {file:g})" for name, (file, own) in numbers.items()], shown=6)
         ),
         "reference_moved": _reference_moved,
         "joints_locked": "locked joints: {values:few %s at %g}",

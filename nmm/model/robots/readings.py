@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
+from typing import Any
 
 from nmm.base.arrays import Array
 from nmm.base.findings import Finding
@@ -21,6 +22,22 @@ class Readings:
         """The numbers that are not those of its file (`nominal`, see `nmm.with_numbers`): what it has."""
         changed: Mapping[str, float] = lazy_call("nmm.model.robots.numbers:changed_numbers")(self)
         return changed
+
+    def numbers_named(self, names: Collection[str]) -> dict[str, Any]:
+        """`nmm.robot_numbers` with the frames that these numbers' names speak of, as far as it has such."""
+        numbers: dict[str, Any] = lazy_call("nmm.model.robots.numbers:numbers_for")(self, names)
+        return numbers
+
+    def file_places(self, names: Collection[str]) -> dict[str, tuple[float, ...]]:
+        """Where the file has those of its arm's joints and of its frames that are named: by name x, y, z,
+        roll, pitch, yaw in what carries them, m and rad, and along or about what a joint moves there (9,)."""
+        places: dict[str, tuple[float, ...]] = lazy_call("nmm.model.robots.origins:file_places")(self, names)
+        return places
+
+    def apart_in_file(self, places: Mapping[str, Sequence[float]]) -> dict[str, float]:
+        """How far the file has joints and frames from such places: by name the largest difference, m or 1."""
+        apart: dict[str, float] = lazy_call("nmm.model.robots.origins:apart_in_file")(self, places)
+        return apart
 
     @cached_property
     def reversed_joints(self) -> tuple[str, ...]:
@@ -46,3 +63,8 @@ class Readings:
             self, q, q_dot
         )
         return read
+
+    @cached_property
+    def _encoders(self) -> Any:
+        """What reads the joints' encoders (`nmm.plugins.robot.encoders.Encoders`)."""
+        return lazy_call("nmm.plugins.robot.encoders:Encoders")(self)

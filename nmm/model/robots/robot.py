@@ -50,7 +50,9 @@ class Robot(Coordinates, Readings):
     followers : the mimic joints, each by an independent coordinate; they have no input of their own
     semantics : what its SRDF says
     nominal : what its file says of the numbers that were changed (`nmm.with_numbers`), by name
-    corrections : by steered joint, ratio (1) and offset (rad): coordinate = ratio * reading + offset
+    corrections : by steered or arm joint, ratio (1) and offset: coordinate = ratio * reading + offset
+    origins : by joint or frame, how it is placed in its axes as the file has them: x, y, z, roll, pitch, yaw
+    unmoved : where the file has what `origins` moves (`nmm.model.robots.origins.Unmoved`)
     parts : what loading keeps for mounting and for reports (`nmm.model.robots.loading.provenance.Parts`)
 
     Examples
@@ -82,6 +84,8 @@ class Robot(Coordinates, Readings):
     semantics: Semantics = field(default_factory=Semantics)
     nominal: Mapping[str, float] = field(default_factory=dict)
     corrections: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    origins: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    unmoved: Any = field(default=None, repr=False)
     parts: Any = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -211,11 +215,6 @@ class Robot(Coordinates, Readings):
         """
         q: Array = self._encoders.q(joints, base, near)
         return q
-
-    @cached_property
-    def _encoders(self) -> Any:
-        """What reads the joints' encoders (`nmm.plugins.robot.encoders.Encoders`)."""
-        return lazy_call("nmm.plugins.robot.encoders:Encoders")(self)
 
     def odometry(self, q: ArrayLike, encoders: Mapping[str, float], **options: Any) -> Any:
         """A platform's pose by its wheels' encoders, from q (n,) on (`nmm.Odometry`).

@@ -120,8 +120,12 @@ class Elements(Shape):
 
     def drawn(self) -> Any:
         """The outer faces of cells with elements, larger cells where there would be too many faces."""
-        everywhere = self.centres if self.inside is None else np.vstack([self.centres, self.inside])
-        return cell_mesh(everywhere, self.corner, self.cell)
+        return cell_mesh(self.everywhere, self.corner, self.cell)
+
+    @property
+    def everywhere(self) -> Array:
+        """The points, or the centres of all boxes, (K, 3), m."""
+        return self.centres if self.inside is None else np.vstack([self.centres, self.inside])
 
     def as_json(self) -> tuple[dict[str, Any], Array]:
         """All of it as plain data and an array (N, 3), for a file."""

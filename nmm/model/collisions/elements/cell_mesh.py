@@ -15,6 +15,17 @@ FACES = 15_000
 
 def cell_mesh(points: Array, corner: Array, cell: Array) -> Any:
     """A mesh of Coal's of the cells in which there are points (N, 3), m; edges are multiples of `cell`."""
+    vertices, triangles = cell_triangles(points, corner, cell)
+    mesh = coal.BVHModelOBBRSS()
+    mesh.beginModel(len(triangles), len(vertices))
+    mesh.addVertices(vertices)
+    mesh.addTriangles(np.ascontiguousarray(triangles, dtype=np.int32))
+    mesh.endModel()
+    return mesh
+
+
+def cell_triangles(points: Array, corner: Array, cell: Array) -> tuple[Array, Integers]:
+    """Vertices (V, 3), m, and triangles (F, 3) of that mesh."""
     times = 1
     while True:
         edge = cell * times
@@ -33,14 +44,9 @@ def cell_mesh(points: Array, corner: Array, cell: Array) -> Any:
         at[rows, (axis + 1) % 3] += np.where(side == 1, a, b) * long
         at[rows, (axis + 2) % 3] += np.where(side == 1, b, a) * wide
         vertices[:, k] = corner + at * edge
-    mesh = coal.BVHModelOBBRSS()
-    mesh.beginModel(2 * len(faces), 4 * len(faces))
-    mesh.addVertices(vertices.reshape(-1, 3))
     begin = 4 * np.arange(len(faces))[:, np.newaxis]
     triangles = np.vstack([begin + np.array([0, 1, 2]), begin + np.array([0, 2, 3])])
-    mesh.addTriangles(np.ascontiguousarray(triangles, dtype=np.int32))
-    mesh.endModel()
-    return mesh
+    return vertices.reshape(-1, 3), triangles
 
 
 def _outer_faces(cells: Integers) -> Integers:

@@ -42,6 +42,11 @@ class SensedObstacle(Obstacle):
         shape: Any = self.shape
         return shape
 
+    @property
+    def blank(self) -> bool:
+        """Whether nothing is seen of it."""
+        return self._blank
+
     def _renew(self, wait: bool, make: Callable[..., Attributes], *arguments: Any) -> None:
         """Set what `make` returns, in the background. Raises what an earlier call's `make` raised, and where
         it waits its own."""

@@ -23,7 +23,7 @@ from nmm.model.robots.loading.locking import add_pairs, told_apart
 from nmm.model.robots.loading.passes import robot_from
 from nmm.model.robots.loading.provenance import loaded_parts, with_wheels_fixed
 from nmm.model.robots.loading.source import Source
-from nmm.model.robots.numbers import with_numbers, without_changes
+from nmm.model.robots.numbers import numbers_for, prefixed, with_numbers, without_changes
 from nmm.model.robots.robot import Robot, frame_index
 
 _PLACES = ("mount", "arm_mount", "top")
@@ -74,8 +74,13 @@ def mount(
         raise RobotError(where="name", expected="a string", got=name)
     base = platform if isinstance(platform, Robot) else load(platform)
     other = arm if isinstance(arm, Robot) else _loaded_arm(arm)
-    mounted = _mounted(without_changes(base), other, at, _pose(placement), prefix, name)
-    return with_numbers(mounted, base.changed_numbers)
+    mounted, before = _mounted(
+        without_changes(base), without_changes(other), at, _pose(placement), prefix, name
+    )
+    numbers = {prefixed(number, before): value for number, value in other.changed_numbers.items()}
+    known = numbers_for(mounted, numbers)  # those of the arm's own platform go with it
+    numbers = {number: value for number, value in numbers.items() if number in known}
+    return with_numbers(mounted, {**numbers, **base.changed_numbers})
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +107,8 @@ class _Body:
 
 def _mounted(
     base: Robot, arm: Robot, at: str | None, pose: pin.SE3, prefix: str | None, name: str | None
-) -> Robot:
+) -> tuple[Robot, str]:
+    """The robot, and the prefix that the arm's names got."""
     parts, arm_parts = loaded_parts(base), loaded_parts(arm)
     platform = _Body(base.display_model, base.shapes.visual_model, parts.collision_model)
     # The arm alone: of a fixed base, with its wheels standing still.
@@ -152,7 +158,8 @@ def _mounted(
     new_parts = replace(robot.parts, provenance=replace(robot.parts.provenance, **own))
     semantics = base.semantics.with_arm(arm.semantics, prefix, joints)
     arms = {**base.arms, key: joints}
-    return replace(robot, **robot.shapes._asdict(), arms=arms, semantics=semantics, parts=new_parts)
+    made = replace(robot, **robot.shapes._asdict(), arms=arms, semantics=semantics, parts=new_parts)
+    return made, prefix
 
 
 def _prefix(base: Robot, arm: Robot, platform: _Body, body: _Body, prefix: str | None) -> tuple[str, str]:
