@@ -25,6 +25,10 @@ WORDS: dict[str, Words] = {
     "platform_unknown": "{s:.4g} s of joint states, in which the platform's pose is not known, are left out",
     "actions_beyond": "actions ask for up to {times:.3g} times the velocity measured of the platform: q "
     "and u are of what was measured",
+    "wheels_too_fast": "velocities of the platform ask wheels for {times:.3g} times their limits: another "
+    "unit?",
+    "velocity_impossible": "{share:.0%} of a velocity is one that {platform} cannot have: another robot's "
+    "data, or another unit?",
     "joints_outside": "{names:and} {names:plural is|are} outside {names:plural its|their} limits by up to "
     "{most:.3g}: another unit, or another zero?",
 }

@@ -429,6 +429,18 @@ WORDS = [
         "measured",
     ),
     (
+        "wheels_too_fast",
+        {"times": 9.9},
+        {},
+        "velocities of the platform ask wheels for 9.9 times their limits: another unit?",
+    ),
+    (
+        "velocity_impossible",
+        {"share": 0.6, "platform": "DifferentialDrive"},
+        {},
+        "60% of a velocity is one that DifferentialDrive cannot have: another robot's data, or another unit?",
+    ),
+    (
         "joints_outside",
         {"names": ["q1"], "most": 1.5},
         {},

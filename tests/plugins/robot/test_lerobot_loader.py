@@ -152,3 +152,21 @@ def test_what_lerobot_records_of_lekiwi_is_read(lekiwi: dict[str, Any], tmp_path
     assert [len(one) for one in read] == [21, 6]
     assert read[0].q[-1, :3] == pytest.approx([0.5, 0.5, np.pi / 2], abs=1e-6)
     assert read[0].q[-1, 3:] == pytest.approx([*np.radians([-30, 30, 50, 0, 0]), 0.375], abs=1e-6)
+
+
+@pytest.mark.browser
+def test_lerobot_decodes_pictures_at_their_frames(tmp_path: Path) -> None:
+    from test_lerobot_video import ISO, SIZE, decoded, runs
+
+    place = nmm.write_lerobot(runs(), tmp_path / "set", fps=10, video="iso", size=SIZE)
+    told = by_lerobot("pictures", place, tmp_path / "pictures.npz")
+    if "lacks" in told:
+        pytest.skip(f"LeRobot has no decoder here: {told['lacks']}")
+    assert told["keys"] == [ISO]
+    found = np.load(tmp_path / "pictures.npz")[ISO]
+    files = sorted((place / "videos" / ISO).rglob("*.mp4"))
+    expected = np.concatenate([decoded(file) for file in files]).transpose(0, 3, 1, 2)
+    assert found.shape == expected.shape == (12, 3, SIZE[1], SIZE[0])
+    apart = np.abs(found[:, None] - expected[None]).mean(axis=(2, 3, 4))
+    assert apart.argmin(axis=1).tolist() == [*range(12)]
+    assert np.diag(apart).max() < 0.02

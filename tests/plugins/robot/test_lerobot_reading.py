@@ -125,15 +125,18 @@ def test_shares_of_a_range_are_what_a_calibration_makes_of_them(lekiwi: nmm.Robo
 
 
 def test_what_an_encoder_reads_is_corrected_and_a_coordinate_is_not(tmp_path: Path) -> None:
-    """A steering whose axis points down and that stands askew; a data set of a recorder and one of nmm's."""
+    """A steering whose axis points down and that stands askew, an arm's joint that is geared the other way
+    round; a data set of a recorder and one of nmm's."""
     nominal = nmm.load(write(tmp_path / "down.urdf", vehicle("steering", 0.7, up=False)))
-    robot = nmm.with_numbers(nominal, {"offset.steering": 0.1, "ratio.steering": 1.25})
-    i = robot.q_names.index("steering")
+    askew = {"offset.steering": 0.1, "ratio.steering": 1.25, "offset.q1": -0.05, "ratio.q1": -1.0}
+    robot = nmm.with_numbers(nominal, askew)
+    i, arm = (robot.q_names.index(name) for name in ("steering", "q1"))
     run = moved(robot)
     names = [f"{name}.pos" for name in robot.q_names]
     recorded = run.q.copy()
     recorded[:, i] = [robot.reading("steering", angle) for angle in run.q[:, i].tolist()]
     assert np.abs(recorded[:, i] - (run.q[:, i] - 0.1) / -1.25).max() < 1e-12
+    recorded[:, arm] = -0.05 - run.q[:, arm]
     place = lerobot_set(tmp_path / "recorded", [recorded], names=names, fps=20)
     units = {"?.pos": "m", "theta.pos": "rad", "steering.pos": "rad", "q1.pos": "rad"}
     (read,) = nmm.read_lerobot(place, robot, units=units)
@@ -150,6 +153,13 @@ def test_what_an_encoder_reads_is_corrected_and_a_coordinate_is_not(tmp_path: Pa
         place = lerobot_set(tmp_path / kind, [rows], names=names, fps=20)
         (read,) = nmm.read_lerobot(place, robot, units=units | {"steering.pos": "-100..100"}, **{kind: given})
         assert np.abs(read.q - run.q).max() < 1e-6
+    lower, upper = nominal.q_limits[arm]  # which its encoder has, too
+    rows = recorded.copy()
+    rows[:, arm] = 200 * (recorded[:, arm] - lower) / (upper - lower) - 100
+    place = lerobot_set(tmp_path / "limits", [rows], names=names, fps=20)
+    shares = units | {"q1.pos": "-100..100"}
+    (read,) = nmm.read_lerobot(place, robot, units=shares, ranges={"q1": "limits"})
+    assert np.abs(read.q - run.q).max() < 1e-6
     written = nmm.write_lerobot(run, tmp_path / "written", task="steer", fps=20)
     (written / "meta" / "nmm.json").unlink()  # as LeRobot's tools do
     (read,) = nmm.read_lerobot(written, robot)
@@ -255,6 +265,17 @@ def test_what_a_data_set_states_is_not_overruled(tmp_path: Path) -> None:
     nmm.read_lerobot(place, run.robot, units={"q*.pos": "rad"})
     with pytest.raises(InputError, match=r"units: q1.pos: expected 'rad', as the data set states, got 'deg'"):
         nmm.read_lerobot(place, run.robot, units={"q*.pos": "deg"})
+
+
+def test_velocities_that_wheels_cannot_make_are_doubted(lekiwi: nmm.Robot, tmp_path: Path) -> None:
+    place = lerobot_set(tmp_path / "set", [states()])
+    with pytest.warns(RuntimeWarning, match="ask wheels for .* times their limits: another unit"):
+        nmm.read_lerobot(place, lekiwi, units=DEGREES | {"theta.vel": "rad/s"}, ranges=GRIPPER)
+    rows = np.tile([0.1, 0.2, 0.0], (30, 1))
+    other = lerobot_set(tmp_path / "other", [rows.astype(np.float32)], names=["x.vel", "y.vel", "theta.vel"])
+    units = {"?.vel": "m/s", "theta.vel": "rad/s"}
+    with pytest.warns(RuntimeWarning, match="89% of a velocity is one that .* cannot have: another robot's"):
+        nmm.read_lerobot(other, nmm.load("differential_base"), units=units)
 
 
 def test_actions_are_what_was_asked_not_what_wheels_did(lekiwi: nmm.Robot, tmp_path: Path) -> None:

@@ -19,6 +19,8 @@ VERSION = "v3.0"
 INFO, STATS, TASKS, EPISODES = "meta/info.json", "meta/stats.json", "meta/tasks.parquet", "meta/episodes"
 #: What info.json says of the files of frames.
 DATA = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+#: The same of videos, a file an episode.
+VIDEO, VIDEOS = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4", "observation.images"
 #: Files of a chunk, and MB of a file, as LeRobot has them.
 FILES_A_CHUNK, MB_A_FILE = 1000, 100
 #: Frames a second: more is no camera's and no policy's.

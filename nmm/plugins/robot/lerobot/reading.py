@@ -15,6 +15,7 @@ from nmm.base.errors import InputError, expect, expect_known, one_or_several
 from nmm.base.findings import Finding
 from nmm.model.robots.robot import Robot
 from nmm.motion.trajectory import Trajectory
+from nmm.plugins.robot.lerobot.doubts import of_joints, of_velocities
 from nmm.plugins.robot.lerobot.layout import ACTION, INFO, PLACE, RATE, STATE
 from nmm.plugins.robot.lerobot.stored import DataSet, Episode, EpisodeFrames
 from nmm.plugins.robot.lerobot.units import ColumnUnits, Ranges, stated_units
@@ -26,8 +27,6 @@ from nmm.views.folders.whole import steady
 TWIST = {"vx": ("x.vel", "m/s"), "vy": ("y.vel", "m/s"), "omega": ("theta.vel", "rad/s")}
 #: Actions beyond what was measured by more than this are told.
 BEYOND = 1.1
-#: A joint so far outside its limits, as a share of its range, is doubted.
-OUTSIDE = 0.25
 
 
 def read_lerobot(
@@ -205,10 +204,10 @@ class _Measured:
             known = [self._values(state, column, "") for column, _ in self.twist.values()]
             twist = np.column_stack(known)
             q[:, :3] = driven(self.start, t, twist)
-            findings += self._beyond(frames, twist)
+            findings += [*self._beyond(frames, twist), *of_velocities(robot, q, twist)]
         if robot.mimic_joints:
             q = np.array([robot.following.placed(row) for row in q])
-        findings += self._outside(q)
+        findings += of_joints(robot, q)
         if self.inputs:
             return q, self._finite(frames.rows[ACTION], self.actions), findings
         return q, self._nearest(t, q, twist), findings
@@ -249,19 +248,6 @@ class _Measured:
         if not shares or not max(shares) > BEYOND:
             return []
         return [Finding("actions_beyond", {"times": float(max(shares))})]
-
-    def _outside(self, q: Array) -> list[Finding]:
-        """Joints far outside their limits: degrees taken for radians, or another zero."""
-        robot, found = self.robot, dict[str, float]()
-        for i in range(min(3, robot.platform.n_p), robot.n):
-            lower, upper = robot.q_limits[i]
-            if robot.limited[i].all():
-                most = float(max(lower - q[:, i].min(), q[:, i].max() - upper))
-                if most > OUTSIDE * (upper - lower):
-                    found[robot.q_names[i]] = most
-        if not found:
-            return []
-        return [Finding("joints_outside", {"names": [*found], "most": max(found.values())})]
 
 
 def _most(rows: Array, part: list[int]) -> float:

@@ -130,7 +130,7 @@ class ColumnUnits:
         i = self._robot.q_names.index(coordinate)
         if self._limits & {*names, "*"} and self._robot.limited[i].all():
             lower, upper = self._robot.q_limits[i].tolist()
-            return lower, upper
+            return (lower, upper) if factor > 0.0 else (upper, lower)  # as its encoder counts
         what = f"{column} is a share of {coordinate}'s range, and where that ends is not known"
         expected = f"ranges={{{coordinate!r}: (lower, upper)}} or 'limits', or calibration="
         raise InputError(what, expected=expected, available=[*self._ranges, *self._calibrated] or None)

@@ -16,6 +16,7 @@ from nmm.plugins.robot.lerobot import layout
 from nmm.plugins.robot.lerobot.frames import check_same, features_of, frames_of
 from nmm.plugins.robot.lerobot.layout import COUNTED, FASTEST, Feature, arrow, is_data_set, parquet, places
 from nmm.plugins.robot.lerobot.stats import statistics
+from nmm.plugins.robot.lerobot.videos import EpisodeVideos
 from nmm.views.folders.whole import check_folder, replaced_folder
 
 #: What a task may be as long as, characters.
@@ -28,6 +29,8 @@ def write_lerobot(
     *,
     task: str | Sequence[str] | None = None,
     fps: int = 30,
+    video: str | Sequence[str] = (),
+    size: tuple[int, int] = (640, 480),
 ) -> Path:
     """Write runs of one robot as a data set of LeRobot's, v3.0, an episode a run (docs/data_sets.md).
 
@@ -35,7 +38,8 @@ def write_lerobot(
     and "q1.vel"; where the runs' task wants a point of the robot, that point, as
     `observation.environment_state`; and LeRobot's timestamp, frame_index, episode_index, index, task_index.
     Units are SI; meta/info.json states each beside its name (`units`). Joints are coordinates, with the
-    robot's corrections, not what encoders read (`robot.reading`). There are no pictures.
+    robot's corrections, not what encoders read (`robot.reading`). Pictures, where they are wanted, are drawn
+    by Chromium without a window: `observation.images.iso` and so on, a video of each episode.
 
     Parameters
     ----------
@@ -43,12 +47,15 @@ def write_lerobot(
     folder : new, empty or a data set that this wrote and nobody changed; it appears whole or not at all
     task : what is done, in words, of all runs or of each; the title of each run's scenario when not given
     fps : frames a second, no more than the runs have samples. q is linear between samples
+    video : the side from which each frame is seen, or several: iso, top, front, wall; none unless given
+    size : of a picture, width and height, px, even numbers
 
     Raises
     ------
     InputError : no run; runs of several robots; one that is shorter than two frames, has fewer samples than
-        frames, a gap, or a number that is not finite; a folder with something else. None of it is written
-        then
+        frames, a gap, or a number that is not finite; a folder with something else; no such side or size.
+        None of it is written then
+    RunError : pictures are wanted, and there is no Chromium, or no ffmpeg
 
     Examples
     --------
@@ -62,8 +69,11 @@ def write_lerobot(
     arrow(), parquet()
     check_folder(Path(folder), is_untouched)
     several = (runs,) if isinstance(runs, Trajectory) else runs
+    if video:
+        EpisodeVideos(Path(folder), rate, video, size)  # before anything is written
     with replaced_folder(folder, is_untouched) as temporary:
-        _DataSet(temporary, rate).write(_named(several, task))
+        seen = EpisodeVideos(temporary, rate, video, size) if video else None
+        _DataSet(temporary, rate, seen).write(_named(several, task))
     return Path(folder)
 
 
@@ -119,8 +129,8 @@ def _title(run: Trajectory) -> str:
 class _DataSet:
     """The files of one data set, written from the first episode on."""
 
-    def __init__(self, folder: Path, fps: int) -> None:
-        self.folder, self.fps = folder, fps
+    def __init__(self, folder: Path, fps: int, videos: EpisodeVideos | None) -> None:
+        self.folder, self.fps, self.videos = folder, fps, videos
         self.features: dict[str, Feature] = {}
         self.tasks: dict[str, int] = {}
         self.episodes: list[dict[str, Any]] = []
@@ -140,6 +150,9 @@ class _DataSet:
                     first = self._begin(run) if first is None else first
                     check_same(run, first, self.features)
                     self._add(frames_of(run, self.fps, self.features), task)
+                    if self.videos is not None:
+                        last = self.episodes[-1]
+                        last |= self.videos.add(run, last["length"])
                 except InputError as error:
                     raise error.at(where) from None
         finally:
@@ -207,7 +220,7 @@ class _DataSet:
 
     def _finish(self, first: Trajectory) -> None:
         features, count = {**self.features, **COUNTED}, len(self.episodes)
-        info = {
+        info: dict[str, Any] = {
             "codebase_version": layout.VERSION,
             "robot_type": first.robot.name,
             "total_episodes": count,
@@ -219,10 +232,13 @@ class _DataSet:
             "fps": self.fps,
             "splits": {"train": f"0:{count}"},
             "data_path": layout.DATA,
-            "video_path": None,
+            "video_path": None if self.videos is None else layout.VIDEO,
             "features": {name: feature.told() for name, feature in features.items()},
         }
         stats = {name: statistics(np.concatenate(rows)) for name, rows in self._all.items()}
+        if self.videos is not None:
+            info["features"] |= self.videos.features()
+            stats |= self.videos.statistics()
         for path, content in ((layout.INFO, info), (layout.STATS, stats)):
             text = json.dumps(content, indent=4, ensure_ascii=False)
             (self.folder / path).write_text(text + "\n", encoding="utf-8")
