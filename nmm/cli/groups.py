@@ -15,9 +15,10 @@ from typer.models import ParameterInfo
 
 from nmm.base.errors import InputError, expect_known
 from nmm.base.kinds import PLATFORMS
-from nmm.base.plugins import Beside, OptionGroup, complain, groups_of_options
+from nmm.base.plugins import OptionGroup, complain, groups_of_options
 from nmm.base.text_format import listed
 from nmm.base.trust import trusting
+from nmm.cli.beside import GuardedBeside, guarded
 from nmm.cli.options import (
     AT,
     SUBJECT_SET,
@@ -64,10 +65,10 @@ class AddedOptions:
         return None
 
     @contextmanager
-    def beside(self, scenario: Any, controller: Any) -> Iterator[list[Beside]]:
+    def beside(self, scenario: Any, controller: Any) -> Iterator[list[GuardedBeside]]:
         """What each has to go on beside a run."""
         with ExitStack() as stack:
-            yield [stack.enter_context(group.beside(scenario, controller)) for group in self.groups]
+            yield [stack.enter_context(guarded(group.beside(scenario, controller))) for group in self.groups]
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@ settings of its own, or one in a Python file."""
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -220,6 +221,14 @@ def chosen(text: str, option: str) -> ChosenResolver:
         expect(key and equals and value, option, "KIND:KEY=VALUE, as in pg:alpha=50", text)
         settings.append((key, value))
     return ChosenResolver(text, kind, tuple(settings))
+
+
+def size_of(value: str) -> tuple[int, int]:
+    """Width and height, px; `InputError` for what is no such size."""
+    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", value)
+    if match is None:
+        raise InputError(where="--size", expected="WIDTHxHEIGHT, as in 1280x720", got=value)
+    return int(match[1]), int(match[2])
 
 
 def named(value: str, option: str, expected: str = EXPECTED) -> list[str]:

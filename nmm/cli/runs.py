@@ -13,7 +13,7 @@ import typer
 
 from nmm.base.errors import InputError
 from nmm.base.kinds import RESOLVERS
-from nmm.base.text_format import counted, listed
+from nmm.base.text_format import listed
 from nmm.cli.groups import (
     AddedOptions,
     Browser,
@@ -132,9 +132,12 @@ def run(
             other.end(trajectory, ends)
         if page is not None and len(trajectory) and not ends:
             page.stay(trajectory, ellipsoids=shown_ellipsoids)
+    faults = [fault for other in others for fault in other.faults]
+    for fault in faults:
+        complain("nmm run", f"{fault}; the run is in {folder}")
     if play and planned and not ends:
         trajectory.play(**browser.keywords(), ellipsoids=shown_ellipsoids)
-    return status
+    return FAILED if faults else status
 
 
 def _called(scenario: Scenario) -> str:
@@ -217,9 +220,9 @@ def compare(
         trajectories.append(_run(made, controller, label=label))
         if trajectories[-1].outcome == "interrupted":
             break
-    missing = len(scenarios) - len(trajectories)
-    if missing and comparison.is_comparison(folder):
-        warn(f"{counted(missing, 'run')} of {len(scenarios)} did not begin: the comparison in {folder} stays")
+    if trajectories[-1].outcome == "interrupted" and comparison.is_comparison(folder):
+        ended = f"run {len(trajectories)} of {len(scenarios)}"
+        warn(f"{ended} was interrupted: the comparison in {folder} stays")
         return INTERRUPTED
     with shielded():
         comparison.save(trajectories, folder, name, **drawn)

@@ -8,7 +8,9 @@ import numpy as np
 import pinocchio as pin
 import trimesh
 
-from nmm.plugins.streams.pictures import Triangles
+from nmm.model.collisions.elements.boxes import Elements
+from nmm.model.collisions.obstacle import Obstacle
+from nmm.plugins.streams.pictures import SensedCells, Surface, Triangles, Undrawn
 from nmm.views.playback.meshes import mesh_pieces
 
 coal = pin.hppfcl
@@ -27,6 +29,17 @@ def surface(geometry: Any) -> Triangles | None:
     begins = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
     faces = [piece.faces.astype(np.int64) + begin for piece, begin in zip(pieces, begins, strict=False)]
     return Triangles(np.vstack([piece.vertices for piece in pieces]).astype(np.float64), np.vstack(faces))
+
+
+def shown_surface(obstacle: Obstacle, shape: Any) -> Surface:
+    """An obstacle's shape as pictures have it: what was sensed as points, of which whoever draws it makes the
+    surface, as that takes long."""
+    if getattr(obstacle, "blank", False):
+        return Undrawn("")
+    if isinstance(shape, Elements):
+        return SensedCells(shape.everywhere, shape.corner, shape.cell)
+    made = surface(shape.drawn())
+    return Undrawn("its surface has no end") if made is None else made
 
 
 def _round_or_box(form: Any) -> trimesh.Trimesh | None:

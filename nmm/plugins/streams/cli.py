@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from nmm.base.errors import InputError, expect_known
+from nmm.base.errors import InputError, NmmError, expect_known
 from nmm.base.files import replaceable
 from nmm.base.plugins import Beside, OptionGroup
 from nmm.cli.interrupts import shielded
 from nmm.cli.options import option
 from nmm.cli.output import show_text, warn
-from nmm.plugins.streams.tools import PORTS, SUFFIXES, expect_installed
+from nmm.plugins.streams.tools import PORTS, RERUN, SUFFIXES, expect_installed
 
 if TYPE_CHECKING:
     from nmm.plugins.streams.run_stream import RunStream
@@ -61,7 +61,11 @@ class StreamOptions(OptionGroup):
 
     def check(self) -> None:
         for text in self.stream or ():
-            wanted(text)
+            one = wanted(text)
+            if one.tool == RERUN and one.file is None:  # before a plan is made, which takes long
+                from nmm.plugins.streams.sending import expect_viewer
+
+                expect_viewer(one.port)
 
     @contextmanager
     def beside(self, scenario: Any, controller: Any) -> Iterator[Beside]:
@@ -109,13 +113,26 @@ class Streams(Beside):
     def end(self, run: Any, asked: bool) -> None:
         from nmm.plugins.streams.streaming import stream
 
+        broken: list[NmmError] = []
         for one in self._several if len(run) else ():
             if one.file is not None:
-                with shielded():
-                    written = stream(run, one.tool, file=one.file)
-                show_text(f"written for {one.tool}: {written.file}")
-        if asked:
-            return
+                try:
+                    with shielded():
+                        written = stream(run, one.tool, file=one.file)
+                    show_text(f"written for {one.tool}: {written.file}")
+                except NmmError as error:  # it keeps no other one back
+                    broken.append(error)
+        if not asked:
+            self._show(run)
+        for other in broken[1:]:
+            warn(str(other))
+        if broken:
+            raise broken[0]
+
+    def _show(self, run: Any) -> None:
+        """Show live streams to their end; a planned motion is shown now."""
+        from nmm.plugins.streams.streaming import stream
+
         shown_runs: list[Any] = [*self._live]
         try:
             for shown in self._live:

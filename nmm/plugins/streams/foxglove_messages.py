@@ -69,10 +69,10 @@ class FoxgloveMessages:
             ]
         )
 
-    def entity(self, name: str, stamp: int, **drawn: Any) -> tuple[str, Any]:
-        """An entity in the world, with its name."""
+    def entity(self, name: str, stamp: int, frame: str = "", **drawn: Any) -> tuple[str, Any]:
+        """An entity in a frame, the world's unless given, with which it moves; with its name."""
         return name, self.kinds.SceneEntity(
-            id=name, timestamp=self.time(stamp), frame_id=self._world, frame_locked=True, **drawn
+            id=name, timestamp=self.time(stamp), frame_id=frame or self._world, frame_locked=True, **drawn
         )
 
     def line(self, points: Array, rgb: Rgb) -> Any:

@@ -9,9 +9,12 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from nmm.base.errors import InputError
 from nmm.plugins.streams.foxglove_messages import BLUE, GREEN, ORANGE, RED, UPRIGHT, FoxgloveMessages
 from nmm.plugins.streams.pictures import CoarseTrail, Pose, RobotPicture, Said, Still, Triangles, finite
+from nmm.plugins.streams.sensed_surfaces import SensedSurfaces
 from nmm.plugins.streams.tools import FOXGLOVE, LOOPBACK, imported
 
 DESCRIPTION, TF, TF_STATIC = "/robot_description", "/tf", "/tf_static"
@@ -20,7 +23,8 @@ ODOMETRY, BELIEVED, TARGET, LOG = "/odom", "/believed_pose", "/desired_pose", "/
 SCENE, MOVING, PATHS, NEAREST = "/scene", "/moving", "/paths", "/nearest"
 #: The Foxglove app knows a description by the name of ROS's type.
 STRING = {"type": "object", "properties": {"data": {"type": "string"}}}
-#: Messages for a client at most that wait to be sent; the oldest go first.
+#: Messages for a client at most that wait to be sent; the oldest go first. What is sent for each picture has
+#: some kB, a path of 400 points 11 kB: 20 MB; what is sensed has 2 MB, once a second, for the 7 s of it.
 BACKLOG = 4096
 
 
@@ -58,8 +62,9 @@ class FoxgloveSink:
         self._drawn: dict[str, dict[str, Any]] = defaultdict(dict)
         self._stamp = still.start
         self._lock = threading.Lock()
-        self._bodies: list[tuple[Triangles, Pose]] = []
-        self._moving: set[int] = set()
+        self._bodies: list[tuple[Triangles | None, Pose]] = []
+        self._loose: set[int] = set()
+        self._surfaces = SensedSurfaces(still)
         self._writer = self._server = None
         self._open_topics()
         if file is not None:
@@ -119,7 +124,7 @@ class FoxgloveSink:
         for topic, kind in (
             (TF, "FrameTransforms"), (TF_STATIC, "FrameTransforms"), (JOINTS, "JointStates"),
             (ODOMETRY, "Odometry"), (BELIEVED, "PoseInFrame"), (TARGET, "PoseInFrame"), (LOG, "Log"),
-            (SCENE, "SceneUpdate"), (MOVING, "SceneUpdate"), (PATHS, "SceneUpdate"), (NEAREST, "SceneUpdate"),
+            (SCENE, "SceneUpdate"), (PATHS, "SceneUpdate"), (NEAREST, "SceneUpdate"),
         ):  # fmt: skip
             self._topics[topic] = getattr(channels, f"{kind}Channel")(topic, context=of)
         named = {INPUTS: self._still.inputs, ERROR: self._still.errors, DISTANCE: [("distance", "m")]}
@@ -157,7 +162,7 @@ class FoxgloveSink:
             drawn = self._drawn[topic]
             drawn.update(entities)
             for name in gone:
-                del drawn[name]
+                drawn.pop(name, None)
             kind, at = self._kinds.SceneEntityDeletionType.MatchingId, self._made.time(stamp)
             deleted = [self._kinds.SceneEntityDeletion(timestamp=at, type=kind, id=name) for name in gone]
             update = self._kinds.SceneUpdate(deletions=deleted, entities=[*drawn.values()])
@@ -188,9 +193,17 @@ class FoxgloveSink:
         if entities:
             self._draw(SCENE, entities, stamp)
 
+    def _called(self, number: int) -> str:
+        return f"obstacle {self._still.bodies[number].name}"
+
     def _body(self, number: int, stamp: int) -> tuple[str, Any]:
-        triangles = [self._made.surface(*self._bodies[number])]
-        return self._made.entity(f"obstacle {self._still.bodies[number].name}", stamp, triangles=triangles)
+        """A body in the world; one that moves in a frame of its own, so that its surface is sent once."""
+        (surface, pose), name = self._bodies[number], self._called(number)
+        if number in self._loose:
+            pose = np.zeros(3), UPRIGHT
+        triangles = [] if surface is None else [self._made.surface(surface, pose)]
+        frame = name if number in self._loose else ""
+        return self._made.entity(name, stamp, frame, triangles=triangles)
 
     def _say(self, said: Said) -> None:
         level = self._kinds.LogLevel.Warning if said.warns else self._kinds.LogLevel.Info
@@ -201,7 +214,9 @@ class FoxgloveSink:
 
     def _show(self, picture: RobotPicture) -> None:
         m, still, stamp, at = self._kinds, self._still, picture.stamp, self._made.time(picture.stamp)
-        self._send(TF, self._made.frames(picture.transforms, stamp), stamp)
+        self._show_bodies(picture)
+        loose = [(still.world, self._called(i), *self._bodies[i][1]) for i in sorted(self._loose)]
+        self._send(TF, self._made.frames([*picture.transforms, *loose], stamp), stamp)
         states = [m.JointState(name=name, position=float(value))
                   for (name, _), value in zip(still.coordinates, picture.q, strict=True)]  # fmt: skip
         self._send(JOINTS, m.JointStates(timestamp=at, joints=states), stamp)
@@ -231,7 +246,6 @@ class FoxgloveSink:
                 )
         self._show_paths(picture)
         self._show_near(picture)
-        self._show_bodies(picture)
 
     def _show_paths(self, picture: RobotPicture) -> None:
         ends = [("driven", picture.reached, BLUE),
@@ -265,16 +279,22 @@ class FoxgloveSink:
             self._send(NEAREST, self._kinds.SceneUpdate(deletions=[deleted]), stamp)
 
     def _show_bodies(self, picture: RobotPicture) -> None:
-        """What moves is on a topic of its own from then on, so that what stands is not sent again with it."""
-        others = {*picture.moved, *picture.changed}
-        for i in others:
+        """What moves, or is sensed anew, is on a topic of its own from then on, so that nothing else is sent
+        again with it."""
+        for i in sorted({*picture.moved, *picture.changed}):
+            topic, name = f"{MOVING}/{self._still.bodies[i].name}", self._called(i)
             surface, pose = self._bodies[i]
-            self._bodies[i] = picture.changed.get(i, surface), picture.moved.get(i, pose)
-        begin = {*picture.moved} - self._moving
-        self._moving |= begin
-        drawn = {i: self._body(i, picture.stamp) for i in sorted(others)}
-        standing = [one for i, one in drawn.items() if i not in self._moving]
-        if begin or standing:
-            self._draw(SCENE, standing, picture.stamp, [drawn[i][0] for i in sorted(begin)])
-        if moving := [one for i, one in drawn.items() if i in self._moving]:
-            self._draw(MOVING, moving, picture.stamp)
+            if i in picture.changed:
+                surface, said = self._surfaces.of(i, picture)
+                if said is not None:
+                    self._say(said)
+            self._bodies[i] = surface, picture.moved.get(i, pose)
+            begins = i not in self._loose
+            if begins:
+                self._loose.add(i)
+                self._topics[topic] = self._channels.SceneUpdateChannel(topic, context=self._context)
+                self._draw(SCENE, [], picture.stamp, [name])
+            if surface is not None and (begins or i in picture.changed):
+                self._draw(topic, [self._body(i, picture.stamp)], picture.stamp)
+            elif i in picture.changed:
+                self._draw(topic, [], picture.stamp, [name])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import ExitStack, suppress
 from functools import partial
@@ -13,7 +14,7 @@ from types import TracebackType
 from typing import NamedTuple
 
 from nmm.base.arrays import Array
-from nmm.base.errors import NmmError
+from nmm.base.errors import NmmError, expect
 from nmm.base.files import whole_file, written_at
 from nmm.base.findings import Finding
 from nmm.base.text_format import one_line
@@ -31,6 +32,9 @@ from nmm.plugins.streams.sinks import Destination
 #: Samples that wait to be sent at most: live, where old ones are of no use, and into a file.
 LIVE, WRITTEN = 120, 10_000
 LONGEST = 300
+IN_MAP = "fixes move the robot in odom: with nmm.stream(…, localised=True) they move odom in map"
+#: Time between two looks whether all is sent, s.
+LOOK = 0.1
 
 
 class LoopLine(NamedTuple):
@@ -47,7 +51,8 @@ def line_of(event: Event) -> LoopLine:
 
 
 class SeenSample(NamedTuple):
-    """What the loop's thread copies of a sample; `active` tasks."""
+    """What the loop's thread copies of a sample; `active` tasks; `seen` in odom, where the stream asks for
+    it; whether q is not."""
 
     t: float
     stamp: int
@@ -56,6 +61,8 @@ class SeenSample(NamedTuple):
     error: Array
     r_d: Array
     active: tuple[bool, ...] | None
+    seen: Array | None
+    corrected: bool
     state: str
 
 
@@ -64,7 +71,14 @@ class LoopStream(Stream):
     stream's makes pictures of it, and a process of its own sends them."""
 
     def __init__(
-        self, loop: Loop, tool: str, file: Path | None, port: int, rate: float, start: float | None
+        self,
+        loop: Loop,
+        tool: str,
+        file: Path | None,
+        port: int,
+        rate: float,
+        start: float | None,
+        localised: bool = False,
     ) -> None:
         super().__init__(tool, file)
         self._loop, self._rate, self._instant = loop, rate, -1
@@ -72,12 +86,15 @@ class LoopStream(Stream):
         self._zero = None if start is None else round(1e9 * start)
         self._followed = followed = Followed(loop.controller)
         robot, live = loop.controller.robot, file is None
+        expect(not localised or robot.platform.n_p, "localised", "a platform that moves", localised)
+        self._localised = localised
         address, assets = addresses(tool, live)
         self._scene = RobotScene(
             robot,
             f"{robot.name}, loop",
             followed.errors,
             self._wall.began if self._zero is None else self._zero,
+            believed=localised,
             marks=followed.marks(robot.rest),
             address=address,
             obstacles=followed.obstacles,
@@ -85,8 +102,11 @@ class LoopStream(Stream):
         # Its `put` neither waits nor lets other threads run, as locks of Python would.
         self._waiting: SimpleQueue[SeenSample | None] = SimpleQueue()
         self._most, self._ended = LIVE if live else WRITTEN, threading.Event()
+        self._done = (
+            threading.Event()
+        )  # Python 3.11 says of a thread that goes on that it has ended (findings/)
         self._closing = threading.Lock()
-        self._state, self._events = "", 0
+        self._state, self._events, self._said_of_map = "", 0, False
         self._notes = [*self._scene.still.notes]
         self._told: dict[Hashable, str | None] = {}
         with ExitStack() as stack:
@@ -122,12 +142,20 @@ class LoopStream(Stream):
                     self._waiting.put(None)
                     return
                 self.dropped += 1
-        self._waiting.put(SeenSample(t, stamp, *numbers, self._followed.active(), str(loop.state)))
+        seen = loop.q_odom if self._localised else None
+        active, state = self._followed.active(), str(loop.state)
+        self._waiting.put(SeenSample(t, stamp, *numbers, active, seen, loop.corrected, state))
 
     def _fails(self, error: BaseException) -> None:
         self.trouble = self.trouble or one_line(f"{type(error).__name__}: {error}", LONGEST)
 
     def _work(self) -> None:
+        try:
+            self._send_all()
+        finally:
+            self._done.set()
+
+    def _send_all(self) -> None:
         last: SeenSample | None = None
         while (seen := self._waiting.get()) is not None:
             last = seen
@@ -142,7 +170,7 @@ class LoopStream(Stream):
 
     def _send(self, seen: SeenSample) -> None:
         try:
-            sample = self._followed.sample(*seen[:7])
+            sample = self._followed.sample(*seen[:8])
             picture = self._scene.picture(sample)
             self._send_lines(seen)
             self._sending.send(picture)
@@ -166,6 +194,9 @@ class LoopStream(Stream):
                 self._sending.send(Said(t, stamp, who, text, warns))
 
     def _lines(self, seen: SeenSample, again: bool) -> Iterator[Callable[[], LoopLine | None]]:
+        if seen.corrected and not self._localised and not self._said_of_map:
+            self._said_of_map = True
+            self._notes.append(IN_MAP)
         while self._notes:
             note = self._notes.pop(0)
             yield partial(LoopLine, seen.t, "", note, True)
@@ -207,18 +238,36 @@ class LoopStream(Stream):
             self(self._loop)  # where it is in the end
             self._ended.set()
             self._waiting.put(None)
-        about = {"complete": "no" if why else "yes", "why": why}
+        live = self.file is None
         try:
-            self._worker.join(self._sending.destination.patience if self.file is None else None)
-            if self._worker.is_alive():  # the viewer takes nothing more
+            hurried = self._finish(self._sending.destination.patience if live else math.inf)
+            if not self._done.is_set():  # the viewer takes nothing more
                 self._sending.kill()
-                self._worker.join()
-            self._sending.close({**about, "dropped": str(self.dropped)})
+                self._done.wait()
+            why = why or ("KeyboardInterrupt" if hurried else "")
+            about = {"complete": "no" if why else "yes", "why": why, "dropped": str(self.dropped)}
+            hurried |= self._sending.close(about)
         except BaseException as error:
             self._sending.kill()
             self._stack.__exit__(type(error), error, error.__traceback__)
             raise
         self._stack.close()
+        if hurried:  # now that it is whole
+            raise KeyboardInterrupt
+
+    def _finish(self, seconds: float) -> bool:
+        """Wait for what is left, so long at most; Ctrl-C drops it, not what was sent. Whether one came."""
+        hurried, end = False, time.monotonic() + seconds
+        while not self._done.is_set() and time.monotonic() < end:
+            try:
+                self._done.wait(LOOK)
+            except KeyboardInterrupt:
+                hurried = True
+                with suppress(Empty):
+                    while self._waiting.get_nowait() is not None:
+                        self.dropped += 1
+                self._waiting.put(None)
+        return hurried
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None

@@ -29,6 +29,25 @@ class Triangles:
 
 
 @dataclass(frozen=True, eq=False)
+class SensedCells:
+    """What was sensed, of which whoever draws it makes a surface: points (N, 3), m, a corner of one of the
+    cells around them (3,) and the cells' edges (3,), m."""
+
+    points: Array
+    corner: Array
+    cell: Array
+
+
+class Undrawn(NamedTuple):
+    """A body that is not drawn any more, and why, where that is news; "" where nothing is seen of it."""
+
+    why: str
+
+
+Surface = Triangles | SensedCells | Undrawn
+
+
+@dataclass(frozen=True, eq=False)
 class DrawnBody:
     """An obstacle, or scenery: its name, no other's, its surface, and its pose in the world at first."""
 
@@ -94,7 +113,7 @@ class RobotPicture:
     reached, wanted (3,) : where the task's frame is, and where it is to be, m in the world; or None
     near : which points are nearest to each other, if any are
     moved : poses of bodies that are elsewhere than before, by number
-    changed : surfaces of bodies that are others, by number
+    changed : of bodies that are others, by number: their surfaces, or what those are made of
     """
 
     t: float
@@ -110,7 +129,7 @@ class RobotPicture:
     wanted: Array | None = None
     near: Near | None = None
     moved: dict[int, Pose] = field(default_factory=dict)
-    changed: dict[int, Triangles] = field(default_factory=dict)
+    changed: dict[int, Surface] = field(default_factory=dict)
 
     def stamped(self, stamp: int) -> RobotPicture:
         """The same with another time of the clock, ns."""

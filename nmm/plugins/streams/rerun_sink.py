@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from nmm.base.arrays import Array
-from nmm.plugins.streams.pictures import RobotPicture, Said, Still, Trail, axes
+from nmm.plugins.streams.pictures import RobotPicture, Said, Still, Trail, Triangles, axes
+from nmm.plugins.streams.sensed_surfaces import SensedSurfaces
 from nmm.plugins.streams.tools import RERUN, imported
 
 #: What the end of a whole file begins with.
@@ -30,6 +31,8 @@ COLORS = {DRIVEN: BLUE, ODOMETRY: ORANGE, DESIRED: GREEN, NEAREST: RED, TARGET: 
 THING = (150, 150, 150, 160)
 #: Length of the axes of odometry, m; radius of a target, m.
 LENGTH, RADIUS = 0.3, 0.03
+#: The surface of what is not drawn any more.
+NOTHING = Triangles(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
 
 
 class RerunSink:
@@ -43,6 +46,7 @@ class RerunSink:
         self._rr, self._still = imported(RERUN), still
         self._trails: dict[Parts, Trail] = defaultdict(Trail)
         self._known: set[Parts] = set()
+        self._surfaces = SensedSurfaces(still)
         self._recording = self._rr.RecordingStream("nmm", recording_id=uuid.uuid4())
         self._file = file
         self._flushed: dict[str, float] = {} if file is not None else {"timeout_sec": patience}
@@ -57,13 +61,16 @@ class RerunSink:
 
     def take(self, items: Sequence[RobotPicture | Said]) -> None:
         """Send pictures and lines of text."""
-        rr, pictures = self._rr, [one for one in items if isinstance(one, RobotPicture)]
         if lines := [one for one in items if isinstance(one, Said)]:
-            levels = [rr.TextLogLevel.WARN if line.warns else rr.TextLogLevel.INFO for line in lines]
-            texts = [f"{line.who}: {line.text}" if line.who else line.text for line in lines]
-            self._send(("log",), lines, rr.TextLog.columns(text=texts, level=levels))
-        if pictures:
+            self._say(lines)
+        if pictures := [one for one in items if isinstance(one, RobotPicture)]:
             self._show(pictures)
+
+    def _say(self, lines: list[Said]) -> None:
+        rr = self._rr
+        levels = [rr.TextLogLevel.WARN if line.warns else rr.TextLogLevel.INFO for line in lines]
+        texts = [f"{line.who}: {line.text}" if line.who else line.text for line in lines]
+        self._send(("log",), lines, rr.TextLog.columns(text=texts, level=levels))
 
     def close(self, about: Mapping[str, str]) -> None:
         """Send what is left, and the recording's property nmm; a file is whole then."""
@@ -231,16 +238,23 @@ class RerunSink:
         for i, body in enumerate(self._still.bodies):
             parts: Parts = (WORLD, "obstacles", body.name)
             poses = [(one, one.moved[i]) for one in pictures if i in one.moved]
-            surfaces = [(one, one.changed[i]) for one in pictures if i in one.changed]
+            surfaces: list[tuple[RobotPicture, Triangles | None]] = []
+            for one in pictures:
+                if i in one.changed:
+                    made, said = self._surfaces.of(i, one)
+                    surfaces.append((one, made))
+                    if said is not None:
+                        self._say([said])
             if self._is_new(parts, rr.Mesh3D.from_fields(albedo_factor=THING)):
                 if i not in pictures[0].moved:
                     poses = [(pictures[0], body.pose), *poses]
                 if i not in pictures[0].changed:
                     surfaces = [(pictures[0], body.surface), *surfaces]
             for picture, surface in surfaces:
+                fields = NOTHING if surface is None else surface
                 for field, rows in (
-                    ("vertex_positions", surface.vertices),
-                    ("triangle_indices", surface.faces),
+                    ("vertex_positions", fields.vertices),
+                    ("triangle_indices", fields.faces),
                 ):
                     self._send(parts, [picture], rr.Mesh3D.columns(**{field: rows}).partition([len(rows)]))
             if poses:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -17,10 +18,13 @@ from nmm.model.robots.surroundings import NO_SURROUNDINGS, Body, Carried, Surrou
 from nmm.plugins.robot.ros.description import description
 from nmm.plugins.robot.ros.making import body_twist, joint_names, readings, rolled_readings, root_link
 from nmm.plugins.robot.ros.placed import PlacedFrames
-from nmm.plugins.streams.bodies import surface
-from nmm.plugins.streams.pictures import DrawnBody, Near, Pose, RobotPicture, Still, Triangles
+from nmm.plugins.streams.bodies import shown_surface, surface
+from nmm.plugins.streams.pictures import DrawnBody, Near, Pose, RobotPicture, Still, Surface, Triangles
 from nmm.views.playback.placements import position_and_quaternion
 from nmm.views.playback.rolling import RolledRobot
+
+#: What is sensed again and again is sent at most so often, s: a surface of it takes long to make.
+ANEW = 1.0
 
 
 class Sample(NamedTuple):
@@ -188,14 +192,13 @@ class RobotScene:
             self._rolled.roll(seen[np.newaxis])
         return self._rolled.now[1]
 
-    def _moved(self, t: float, q: Array) -> tuple[dict[int, Pose], dict[int, Triangles]]:
+    def _moved(self, t: float, q: Array) -> tuple[dict[int, Pose], dict[int, Surface]]:
         """Bodies that are elsewhere, or others, since the last picture."""
-        moved, changed = dict[int, Pose](), dict[int, Triangles]()
+        moved, changed = dict[int, Pose](), dict[int, Surface]()
         for shown in self._obstacles:
-            if shown.obstacle.shape is not shown.shape:  # sensed anew
-                shown.shape = shown.obstacle.shape
-                if (drawn := surface(shown.shape.drawn())) is not None:
-                    changed[shown.number] = drawn
+            if shown.obstacle.shape is not shown.shape and abs(t - shown.since) >= ANEW:  # sensed anew
+                shown.shape, shown.since = shown.obstacle.shape, t
+                changed[shown.number] = shown_surface(shown.obstacle, shown.shape)
             place = shown.obstacle.placement(t)
             if not np.array_equal(place, shown.place):
                 shown.place = place
@@ -227,9 +230,11 @@ class _Held:
 
 @dataclass
 class _Shown:
-    """An obstacle, its number among the bodies, and its shape and place (4, 4) as they were drawn last."""
+    """An obstacle, its number among the bodies, its shape and place (4, 4) as they were drawn last, and since
+    when it is that shape, s."""
 
     number: int
     obstacle: Obstacle
     shape: Any
     place: Array
+    since: float = -math.inf

@@ -89,6 +89,7 @@ class RunStream(Stream):
         self._legs: list[StreamedLeg] = []
         self._run: Trajectory | None = None
         self._finished, self._ended = threading.Event(), threading.Event()
+        self._done = threading.Event()  # a join that Ctrl-C ends says that the thread has ended (findings/)
         self._closed = False
         self._sending = Sending(Destination(tool, None, port, assets), self._scene.still, ends=True)
         self.address = self._sending.address
@@ -103,8 +104,7 @@ class RunStream(Stream):
         """Show the rest of a computed run, what was found in it, and how it ended; Ctrl-C ends that."""
         self._run = run
         self._finished.set()
-        while self._thread.is_alive():  # a join without a time would not hear of Ctrl-C
-            self._thread.join(0.1)
+        self._done.wait()
 
     def close(self, why: str = "") -> None:
         if self._closed:
@@ -113,10 +113,9 @@ class RunStream(Stream):
         self._ended.set()
         self._finished.set()
         try:
-            self._thread.join(2.0)
-            if self._thread.is_alive():  # the viewer takes nothing more
+            if not self._done.wait(2.0):  # the viewer takes nothing more
                 self._sending.kill()
-                self._thread.join()
+                self._done.wait()
             self._sending.close({"complete": "no", "why": why} if self._run is None else about(self._run))
         finally:
             self._sending.kill()
@@ -148,6 +147,8 @@ class RunStream(Stream):
                 self.sent += isinstance(item, RobotPicture)
         except Exception as error:  # beside a run nothing may end it
             self.trouble = one_line(f"{type(error).__name__}: {error}", LONGEST)
+        finally:
+            self._done.set()
 
     def _items(self) -> Iterator[RobotPicture | Said | None]:
         """Pictures, and lines before them, in the order of their times; None while there is nothing new."""

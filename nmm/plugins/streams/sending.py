@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import http.client
 import json
 import pickle
-import socket
 import subprocess
 import sys
 import threading
@@ -25,6 +25,8 @@ _MAIN = (
 ENDED = "the process that sends has ended"
 #: How long a viewer may take nothing before a run is shown no further, and until a process has started, s.
 HELD, STARTS = 20.0, 120.0
+#: What a viewer of Rerun is asked, and how much of an answer is read, bytes.
+WRITES, MOST = "/rerun.sdk_comms.v1alpha1.MessageProxyService/WriteMessages", 4096
 
 
 class SendingEnded(RunError):
@@ -76,19 +78,32 @@ class Sending:
         with self._at_most(HELD if self._ends else None):
             self._write(item)
 
-    def close(self, about: Mapping[str, str]) -> None:
+    def close(self, about: Mapping[str, str]) -> bool:
         """Send what is left, with what is to be said of the whole, and end the process: live within some
-        seconds, whatever the viewer does. `RunError` of a file that is not whole."""
-        live = self.destination.file is None
+        seconds, whatever the viewer does. `RunError` of a file that is not whole. A first Ctrl-C meanwhile
+        loses no file: whether one came."""
+        live, asked = self.destination.file is None, False
         try:
             with self._at_most(2.0 * self.destination.patience if live else None):  # it may take no more
-                with suppress(SendingEnded):
-                    self._write(dict(about))
-                self._closed.wait()
+                last = threading.Thread(target=self._write_last, args=(dict(about),), daemon=True)
+                last.start()
+                try:
+                    self._closed.wait()
+                except KeyboardInterrupt:
+                    if live:
+                        raise
+                    asked = True
+                    self._closed.wait()
         finally:
             self.kill()
         if self._failure is not None and not live:
             raise self._error()
+        return asked
+
+    def _write_last(self, about: dict[str, str]) -> None:
+        """By a thread of its own: Ctrl-C is not to tear it."""
+        with suppress(SendingEnded):
+            self._write(about)
 
     @contextmanager
     def _at_most(self, seconds: float | None) -> Iterator[None]:
@@ -161,9 +176,23 @@ class Sending:
 
 
 def expect_viewer(port: int) -> None:
-    """`InputError` where no viewer of Rerun listens."""
+    """`InputError` where no viewer of Rerun listens, or something else does."""
+    start = f"start one with rerun --bind {LOOPBACK} --port"
+    asked = http.client.HTTPConnection(LOOPBACK, port, timeout=PATIENCE)
     try:
-        socket.create_connection((LOOPBACK, port), timeout=PATIENCE).close()
-    except OSError:
-        what = f"no viewer of Rerun listens at port {port}: start one with rerun --bind {LOOPBACK}"
-        raise InputError(f"{what} --port {port}", where="stream") from None
+        # No messages at all: a viewer takes them, by what browsers speak with it, and shows nothing new.
+        asked.request("POST", WRITES, b"", {"content-type": "application/grpc-web+proto", "x-grpc-web": "1"})
+        answer = asked.getresponse()
+        content = answer.read(MOST)
+    except ConnectionRefusedError:
+        what = f"no viewer of Rerun listens at port {port}: {start} {port}"
+        raise InputError(what, where="stream") from None
+    except (OSError, http.client.HTTPException):
+        content = b""
+    else:
+        if answer.headers.get("grpc-status") is not None or b"grpc-status" in content:
+            return  # also one that has no such service by this name: another version's
+    finally:
+        asked.close()
+    what = f"what listens at port {port} is no viewer of Rerun: {start} and another port"
+    raise InputError(what, where="stream")

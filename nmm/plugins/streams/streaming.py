@@ -37,6 +37,7 @@ def stream(
     rate: float | None = None,
     start: float | None = None,
     stop: threading.Event | None = None,
+    localised: bool = False,
 ) -> Stream:
     """Show a loop or a trajectory in Rerun or Foxglove, live or in a file: the robot's URDF, every link's
     transform, paths, targets, nearest points, inputs, task error, joints, odometry, events and findings
@@ -59,6 +60,8 @@ def stream(
     start : the clock's time at t = 0 in a file, s since 1970; 0 for a trajectory; unless given, stamps of a
         loop are the clock's
     stop : ends a live trajectory when set (by another thread)
+    localised : whether the loop is given a `PoseFilter`: then all stands in map, odometry is where no fix has
+        moved it, and the filter's correction is the transform from map to odom
 
     Raises
     ------
@@ -95,6 +98,7 @@ def stream(
     if port is not None:
         port = int(scalar(port, "port", least=0.0))
         expect(port <= 65535, "port", "a port, up to 65535", port)
+    expect_kind(localised, bool, "localised", "True or False")
     if rate is not None:
         rate = positive(rate, "rate")
     if start is not None:
@@ -102,7 +106,8 @@ def stream(
     expect_installed(to)
     port = PORTS[to] if port is None else port
     if isinstance(what, Loop):
-        return LoopStream(what, to, file, port, rate or RATE, start)
+        return LoopStream(what, to, file, port, rate or RATE, start, localised)
+    expect(not localised, "localised", "a loop: a trajectory says it itself", localised)
     expect(len(what), "stream", "a run with at least one sample")
     if file is not None:
         return written(what, to, file, rate, start or 0.0)

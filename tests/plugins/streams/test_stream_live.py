@@ -11,6 +11,7 @@ import textwrap
 import threading
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -236,6 +237,62 @@ def test_a_loop_is_recorded(broken: bool, tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("when", ["pictures are made", "they are written"])
+def test_a_second_ctrl_c_leaves_what_there_was(
+    when: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While a loop's recording is finished: what waits is dropped, and what was sent is in the file."""
+    from streamed import by_foxglove, said_of
+
+    from nmm.plugins.streams.robot_scene import RobotScene
+
+    waiting = when == "pictures are made"
+    go, picture = threading.Event(), RobotScene.picture
+
+    def slow(scene: RobotScene, sample: Any) -> Any:
+        assert not waiting or go.wait(MOST)
+        return picture(scene, sample)
+
+    monkeypatch.setattr(RobotScene, "picture", slow)
+    driven, file = Driven(), tmp_path / "loop.mcap"
+    file.write_text("what was there")
+    shown: Any = nmm.stream(driven.loop, "foxglove", file=file, rate=1000.0)
+    sender = shown._sending._process
+
+    def again() -> None:
+        wait_for(shown._ended.is_set if waiting else lambda: not shown._worker.is_alive())
+        time.sleep(0.2)
+        os.kill(os.getpid(), signal.SIGINT)
+        if waiting:
+            wait_for(lambda: shown.dropped > 0)
+            go.set()
+        else:
+            time.sleep(0.2)
+            os.kill(sender.pid, signal.SIGCONT)
+
+    second = threading.Thread(target=again)
+
+    def drives() -> None:
+        with shown:
+            for _ in range(60):
+                driven.step(shown)
+            if not waiting:
+                wait_for(lambda: shown.sent == 60)  # of all that comes a pipe holds the rest
+                os.kill(sender.pid, signal.SIGSTOP)
+            second.start()
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        drives()
+    second.join(MOST)
+    said, found = said_of(file), by_foxglove(file)
+    assert (said["complete"], said["why"]) == ("no", "KeyboardInterrupt")
+    assert len(found["/tf"]) == shown.sent
+    assert 0 < shown.sent < 10 if waiting else shown.sent >= 60
+    assert (shown.dropped > 50) is waiting
+    assert [*tmp_path.iterdir()] == [file]
+
+
 def test_findings_of_a_loop_are_told(tmp_path: Path) -> None:
     from streamed import by_foxglove
 
@@ -254,7 +311,7 @@ def test_findings_of_a_loop_are_told(tmp_path: Path) -> None:
 
 
 def test_a_trajectory_is_played_in_its_own_time(patient: None, capsys: pytest.CaptureFixture[str]) -> None:
-    run = nmm.Scenario.load("unicycle_2r_position", {"duration": 0.5}).run()
+    run = nmm.Scenario.load("unicycle_2r_position", {"duration": 3.0}).run()
     made: list[Any] = []
     port = free_port()
     playing = threading.Thread(target=lambda: made.append(nmm.stream(run, "foxglove", port=port)))
@@ -266,7 +323,7 @@ def test_a_trajectory_is_played_in_its_own_time(patient: None, capsys: pytest.Ca
     wait_for(lambda: client.gone)
     assert port not in listening()
     stamps = [stamp for _, stamp, _, _ in client.of("/tf")]
-    assert 1 < len(stamps) <= shown.sent == 31  # who comes misses what goes on until all is subscribed to
+    assert 1 < len(stamps) <= shown.sent == 181  # who comes misses what goes on until all is subscribed to
     assert stamps[-1] - stamps[0] >= 1e9 * ((len(stamps) - 1) / 60 - 0.001) - 1000
     assert all(stamp <= came for _, stamp, _, came in client.messages)
     assert shown.trouble == ""
@@ -299,6 +356,37 @@ def test_without_a_viewer_of_rerun_the_error_says_how_to_start_one() -> None:
     pytest.importorskip("rerun", reason="needs rerun-sdk (pip install '.[streams]')")
     with pytest.raises(nmm.InputError, match=r"no viewer of Rerun .*rerun --bind 127\.0\.0\.1"):
         nmm.stream(make_loop(), "rerun", port=free_port())
+
+
+@pytest.mark.parametrize("listens", ["web", "silent", "other words", "foxglove"])
+def test_what_is_no_viewer_of_rerun_is_told(listens: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever listens there: nothing is sent to it, and nothing waits for it."""
+    import socket
+
+    from ports import served_folder
+
+    pytest.importorskip("rerun", reason="needs rerun-sdk (pip install '.[streams]')")
+    with ExitStack() as stack:
+        if listens == "web":
+            port = int(stack.enter_context(served_folder(Path(__file__).parent)).rpartition(":")[2])
+        elif listens == "foxglove":
+            port = port_of(stack.enter_context(nmm.stream(make_loop(), "foxglove", port=0)))
+        else:
+            monkeypatch.setattr("nmm.plugins.streams.sending.PATIENCE", 0.2)
+            server = stack.enter_context(socket.socket())
+            server.bind(("127.0.0.1", 0))
+            server.listen()
+            port = server.getsockname()[1]
+            if listens == "other words":
+
+                def answers() -> None:
+                    with server.accept()[0] as one:
+                        one.sendall(b"220 post office\r\n")
+                        one.recv(1000)
+
+                threading.Thread(target=answers, daemon=True).start()
+        with pytest.raises(nmm.InputError, match=f"listens at port {port} is no viewer of Rerun"):
+            nmm.stream(make_loop(), "rerun", port=port)
 
 
 def test_the_server_ends_with_the_process_that_drives(tmp_path: Path) -> None:
