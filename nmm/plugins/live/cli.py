@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,6 +18,7 @@ from nmm.cli.options import (
     arguments_of,
     flag,
     option,
+    size_of,
     task_option,
     values_of,
 )
@@ -75,13 +75,11 @@ def render(
     from nmm.plugins.live.rendering import render as render_runs
 
     drawn = ellipsoids.wanted()
-    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", size)
-    if match is None:
-        raise InputError(where="--size", expected="WIDTHxHEIGHT, as in 1280x720", got=size)
+    sides = size_of(size)
     runs = runs_in(folder)
     with progress(video.name) as report:
         render_runs(
-            runs, video, size=(int(match[1]), int(match[2])), view=view, fps=fps, speed=speed, start=start,
+            runs, video, size=sides, view=view, fps=fps, speed=speed, start=start,
             end=end, follow=follow, plots=plots, apart=apart, ellipsoids=drawn, progress=report,
         )  # fmt: skip
     show_text(f"written: {video}")

@@ -32,6 +32,8 @@ WHERE = """([target, way, length]) => {
   return [box.left + (0.5 + 0.5 * p.x) * box.width, box.top + (0.5 - 0.5 * p.y) * box.height];
 }"""
 ERROR = "nmm.state().runs[0].values.error_norm"
+#: What a first plan may take, ms: on a busy machine without a cache it is compiled for more than a minute.
+FIRST_PLAN = 10_000.0 * MOST
 
 
 @pytest.fixture(scope="module")
@@ -205,6 +207,90 @@ def test_the_ball_stays_under_the_pointer_while_the_robot_drives(
         page.wait_for_function(back, arg=robot[:2])
 
 
+#: Where the middle of the robot's base is in the picture, -1 to 1, and where the ball is in the window, px.
+LED = """() => {
+  viewer.scene.updateMatrixWorld(true);
+  viewer.camera.updateMatrixWorld();
+  const at = new MeshCat.THREE.Vector3().setFromMatrixPosition(nmm.node(nmm.motions[0].root).matrixWorld);
+  return at.project(viewer.camera).toArray().slice(0, 2);
+}"""
+
+
+def test_a_camera_follows_the_robot_that_a_hand_leads(window: Window, setup: ScenarioSetup) -> None:
+    """A ball that is held at the picture's edge leads the robot far out of where the picture was, and both
+    stay in it; held in the middle the picture stands, and the target with it."""
+    with driven(setup) as url:
+        page = opened(window, url)
+        page.set_viewport_size({"width": 880, "height": 420})
+        page.get_by_label("K of ee").fill("2.9")
+        page.get_by_label("K of ee").dispatch_event("change")
+        arrived(page)
+        page.evaluate("nmm.camera.look('top')")
+        assert page.evaluate("nmm.camera.following")
+        seen = "nmm.viewer.controls.target.toArray()"
+        first, before = np.array(page.evaluate(seen)), target(page)
+        view = page.locator("#view").bounding_box()
+        assert view is not None
+        page.mouse.move(*page.evaluate(WHERE, [0, "", 0.0]))
+        page.mouse.down()
+        edge = view["x"] + 0.9 * view["width"], view["y"] + 0.5 * view["height"]
+        page.mouse.move(*edge, steps=6)
+        width = 3.0
+        page.wait_for_function(f"{seen}[0] > {first[0] + width}", timeout=1000.0 * MOST)  # no hand moves
+        assert page.evaluate("nmm.gizmos.held !== null")
+        assert target(page)[0] > before[0] + width
+        assert ball_from(page, edge) < 2.0
+        assert np.abs(page.evaluate(LED)).max() < 0.75
+        middle = view["x"] + 0.5 * view["width"], edge[1]
+        page.mouse.move(*middle, steps=6)
+        arrived(page)
+        page.wait_for_timeout(500.0)  # what was under way
+        stands, held = np.array(page.evaluate(seen)), target(page)
+        page.wait_for_timeout(500.0)
+        np.testing.assert_array_equal(page.evaluate(seen), stands)
+        np.testing.assert_array_equal(target(page), held)
+        assert ball_from(page, middle) < 2.0
+        page.mouse.up()
+        arrived(page)
+        np.testing.assert_allclose(target(page), held, atol=1e-9)  # where it was dropped
+
+
+def test_the_line_behind_the_hand_is_in_the_legend(window: Window, setup: ScenarioSetup) -> None:
+    with driven(setup) as url:
+        page = opened(window, url)
+        entry = page.get_by_role("button", name="the last 30 s of ee")
+        shown = "nmm.node('/nmm/trail 0').visible"
+        assert entry.get_attribute("aria-pressed") == "true"
+        assert page.evaluate(shown)
+        entry.click()
+        assert not page.evaluate(shown)
+
+
+def test_a_ring_under_the_hand_moves_no_camera(window: Window, setup: ScenarioSetup) -> None:
+    """Its angle would change without the hand; nor does a hand in the middle of the picture."""
+    with driven(setup) as url:
+        page = opened(window, url)
+        arrived(page)
+        seen = "nmm.viewer.controls.target.toArray()"
+        for hand, moves in (
+            ("null", False),
+            ("() => ({x: 0.5, y: 0})", False),
+            ("() => ({x: 0.9, y: 0})", True),
+        ):
+            before, after = page.evaluate(f"""() => {{
+              nmm.camera.freeze(true, {hand});
+              const before = {seen};
+              const root = nmm.node(nmm.motions[0].root);
+              root.position.x += 5;
+              root.matrix.elements[12] += 5;
+              nmm.camera.update();
+              const after = {seen};
+              nmm.camera.freeze(false);
+              return [before, after];
+            }}""")
+            assert (after != before) is moves
+
+
 #: Where points of a target's ring are in the window, px: `at` rad about its axis from the next axis on, and
 #: `further` times the radius along the tangent there.
 ON_RING = """([axis, points]) => {
@@ -301,7 +387,7 @@ def test_n_plans_round_a_wall_and_the_page_shows_how(window: Window) -> None:
     with driven(ScenarioSetup(nmm.Scenario.load("behind_the_wall"))) as url:
         page = opened(window, url)
         page.keyboard.press("n")
-        page.wait_for_function("nmm.drive.followed >= 1", timeout=1000.0 * MOST)
+        page.wait_for_function("nmm.drive.followed >= 1", timeout=FIRST_PLAN)
         drawn = "nmm.node('/nmm/plan').children.length"
         assert page.evaluate(drawn) == 4  # two ways, the tree, and the copies
         tree = "nmm.node('/nmm/plan/tree')"
@@ -324,7 +410,7 @@ def test_n_plans_round_a_wall_and_the_page_shows_how(window: Window) -> None:
         before, followed = target(page), page.evaluate("nmm.drive.followed")
         drag(page, start, (-40.0, 20.0))
         assert np.linalg.norm(target(page) - before) > 0.05
-        page.wait_for_function(f"nmm.drive.followed > {followed}", timeout=1000.0 * MOST)
+        page.wait_for_function(f"nmm.drive.followed > {followed}", timeout=FIRST_PLAN)
         height = page.get_by_label("ee: z in m, as a number")
         height.fill("3")
         height.press("Enter")
@@ -540,7 +626,7 @@ def test_a_plan_where_the_robot_is_ends_and_the_page_lives(window: Window, setup
         page.keyboard.press("t")
         page.locator("#plan").click()
         page.wait_for_function(
-            "document.getElementById('told').textContent.includes(\"plan's end\")", timeout=1000.0 * MOST
+            "document.getElementById('told').textContent.includes(\"plan's end\")", timeout=FIRST_PLAN
         )
         page.locator("#plan").click()
         time = page.evaluate("nmm.drive.time")

@@ -153,7 +153,9 @@ class Planning:
         if self._refused:
             return f"No plan: {self._refused}", True
         if self._making is not None:
-            return f"A plan is made, since {time.monotonic() - self._began:.0f} s", False
+            since = time.monotonic() - self._began
+            first = " (the first one on a machine is compiled before)" if since > 2.0 * SECONDS else ""
+            return f"A plan is made, since {since:.0f} s{first}", False
         if self._followed is None:
             return "It stops, to plan from where it is", False
         left = self._followed.reference.duration - self._driven.elapsed

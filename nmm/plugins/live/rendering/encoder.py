@@ -4,7 +4,7 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from nmm.base.errors import InputError, RunError, expect
@@ -47,9 +47,10 @@ def last_words(log: Path) -> str:
     return "".join(log.read_text(errors="replace").strip().splitlines()[-1:])
 
 
-def encode(pictures: Iterable[bytes], file: Path, fps: float) -> None:
+def encode(pictures: Iterable[bytes], file: Path, fps: float, options: Sequence[str] = ()) -> None:
     """Write PNG pictures of one size with even sides as a video in the format of the file's suffix, whole or
-    not at all; `InputError` for a file that cannot be written, `RunError` if ffmpeg is missing or fails."""
+    not at all; `options` are ffmpeg's own besides. `InputError` for a file that cannot be written, `RunError`
+    if ffmpeg is missing or fails."""
     target = expect_video(file)
     program = find_ffmpeg()
     with (
@@ -61,7 +62,7 @@ def encode(pictures: Iterable[bytes], file: Path, fps: float) -> None:
         log = Path(folder) / "log"
         command = [
             program, "-y", "-loglevel", "error", "-f", "image2pipe", "-c:v", "png", "-framerate", f"{fps:g}",
-            "-i", "-", *CODECS[file.suffix.lower()], str(made),
+            "-i", "-", *CODECS[file.suffix.lower()], *options, str(made),
         ]  # fmt: skip
         read, write = os.pipe()
         with log.open("wb") as errors:

@@ -70,7 +70,7 @@ def render(
     >>> nmm.rendering.render([run], "motion.mp4", size=(320, 240), fps=10)
     PosixPath('motion.mp4')
     """
-    width, height = _checked_size(size)
+    width, height = checked_size(size)
     fps, speed = positive(fps, "fps"), positive(speed, "speed")
     expect_known("view", view, VIEWS, "render")
     expect(0.0 <= apart <= 1.0, "apart", "0 to 1", apart)
@@ -88,7 +88,7 @@ def render(
     return Path(file)
 
 
-def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
+def checked_size(size: tuple[int, int]) -> tuple[int, int]:
     expect(len(size) == 2, "size", "width and height", size)
     width, height = (counted(side, "size") for side in size)
     for side in (width, height):

@@ -5,6 +5,7 @@
   // Degrees; from above all rays are as good as parallel, as in a plan.
   const [FIELD, PARALLEL] = [36, 1];
   const CATCH = 600; // ms
+  const [FREE, EDGE] = [0.3, 0.6]; // of half the picture: where robots are kept that a hand leads, and from where on it does
   const NARROW = 190; // px: a heading that is too narrow to be read
   // From the target towards the camera, in the world's axes. From right above, up would be nowhere.
   const TOWARDS = {
@@ -12,7 +13,7 @@
     top: new THREE.Vector3(0, -0.001, 1),
     front: new THREE.Vector3(0, -1, 0.06),
   };
-  const camera = (nmm.camera = { following: false, frozen: false, moved: false, first: null, held: null, also: () => [], from: "iso" });
+  const camera = (nmm.camera = { following: false, frozen: false, moved: false, first: null, held: null, also: () => [], moving: () => {}, from: "iso" });
   const chooser = document.getElementById("from");
   // Not the window: a page may have something beside the view.
   const view = document.getElementById("view");
@@ -38,7 +39,7 @@
   camera.unit = () => 2 * tangent(eye ? eye.fov : FIELD);
 
   const upright = (v) => new THREE.Vector3(v.x, v.z, -v.y);
-  let eye, points, tags, last, thawed;
+  let eye, points, tags, last, thawed, leads;
   const vectors = (numbers = []) =>
     Array.from({ length: numbers.length / 3 }, (_, i) => upright(new THREE.Vector3().fromArray(numbers, 3 * i)));
 
@@ -278,13 +279,42 @@
     camera.reset();
   };
 
-  // Under a hand that holds something the picture stands; then the camera catches up.
-  camera.freeze = (on) => {
+  // Where the middle of the robots is in the picture: across and upwards, -1 to 1, and how deep.
+  function seen() {
+    eye.updateMatrixWorld();
+    return middle().project(eye);
+  }
+
+  // Under a hand that holds something the picture stands, but where the hand leads the robots: where it is near an edge of
+  // the picture, as `hand` says, and they come after it, the camera goes along with them. Let go of, it catches up.
+  camera.freeze = (on, hand = null) => {
     camera.frozen = on;
     thawed = { at: performance.now(), left: CATCH };
+    leads = on && camera.following ? hand : null;
   };
+  // Whether the camera has moved.
+  function goAlong() {
+    const [at, hand] = [seen(), leads()];
+    const kept = at.clone();
+    for (const axis of ["x", "y"]) {
+      const side = Math.sign(hand[axis]);
+      if (side * hand[axis] > EDGE && side * at[axis] > FREE) kept[axis] = side * FREE;
+    }
+    if (kept.equals(at)) return false;
+    const way = middle().sub(kept.unproject(eye));
+    eye.position.add(way);
+    nmm.viewer.controls.target.add(way);
+    last.add(way);
+    eye.updateMatrixWorld();
+    return true;
+  }
+
   camera.update = () => {
-    if (!camera.following || camera.frozen) return;
+    if (!camera.following) return;
+    if (camera.frozen) {
+      if (leads && goAlong()) camera.moving();
+      return;
+    }
     const way = middle().sub(last);
     if (thawed) {
       const now = performance.now();

@@ -2,6 +2,7 @@
 "use strict";
 {
   const THREE = MeshCat.THREE;
+  const TRAIL = [0, 0.447, 0.698];
   const [WINDOW, KEPT, SEEN, REDRAW, PATIENCE] = [20, 30, 5, 100, 5000]; // s, s, s, ms, ms
   const drive = (nmm.drive = { targets: [], active: 0, time: 0, paused: false, plan: false, tree: false, grown: true, followed: 0 });
   const panel = document.createElement("div");
@@ -131,7 +132,7 @@
           nmm.gizmos.vector(rotation).forEach((x, i) => one.rotation.length && (value[one.rotation[i]] = x));
           aim(target, value);
         });
-        if (one.frame !== null) target.trail = trail(number);
+        if (one.frame !== null) target.trail = trail(number, one.frame);
       }
       drive.targets.push(target);
       show(target);
@@ -170,14 +171,16 @@
   };
 
   // Where a task's frame has been in the last seconds.
-  function trail(number) {
+  function trail(number, frame) {
     const geometry = new THREE.BufferGeometry();
     const most = 30 * KEPT;
     geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * most), 3));
     geometry.setDrawRange(0, 0);
-    const line = new THREE.Line(geometry, new THREE.LineBasicMaterial({ color: nmm.color([0, 0.447, 0.698]) }));
+    const line = new THREE.Line(geometry, new THREE.LineBasicMaterial({ color: nmm.color(TRAIL) }));
     line.frustumCulled = false;
-    nmm.viewer.set_object(nmm.split(`/nmm/trail ${number}`), line);
+    const path = `/nmm/trail ${number}`;
+    nmm.viewer.set_object(nmm.split(path), line);
+    nmm.legend({ kind: "line", color: TRAIL, text: `the last ${KEPT} s of ${frame}`, path });
     return { geometry, points: [], most };
   }
   function extend({ trail: line, at }) {

@@ -88,13 +88,14 @@
     for (const { group } of gizmos.all) group.traverse((part) => part.isMesh && all.push(part));
     return all;
   }
-  function ray(event) {
+  // Where a pointer is in the picture: across and upwards, -1 to 1.
+  function inPicture({ clientX, clientY }) {
     const box = view.getBoundingClientRect();
-    const at = new THREE.Vector2(
-      (2 * (event.clientX - box.left)) / box.width - 1, 1 - (2 * (event.clientY - box.top)) / box.height,
-    );
+    return new THREE.Vector2((2 * (clientX - box.left)) / box.width - 1, 1 - (2 * (clientY - box.top)) / box.height);
+  }
+  function ray(event) {
     const caster = new THREE.Raycaster();
-    caster.setFromCamera(at, nmm.viewer.camera);
+    caster.setFromCamera(inPicture(event), nmm.viewer.camera);
     return caster;
   }
   function found(event) {
@@ -156,10 +157,10 @@
     event.preventDefault();
     view.setPointerCapture(event.pointerId);
     nmm.viewer.controls.enabled = false;
-    nmm.camera.freeze(true);
-    light(hit);
     const { name, gizmo } = hit;
-    const held = (gizmos.held = { ...hit, start: gizmo.place.clone(), rotation: gizmo.rotation.clone() });
+    nmm.camera.freeze(true, name.startsWith("turn ") ? null : () => inPicture(gizmos.held.event));
+    light(hit);
+    const held = (gizmos.held = { ...hit, event, start: gizmo.place.clone(), rotation: gizmo.rotation.clone() });
     held.ring = name.startsWith("turn ") ? name.slice(5) : null;
     const axis = UNIT[held.ring || name];
     if (axis) held.axis = axis.clone().applyQuaternion(gizmo.own || held.ring ? gizmo.rotation : new THREE.Quaternion());
@@ -185,8 +186,11 @@
 
   function drag(event) {
     const { held } = gizmos;
+    held.event = event;
     return held.ring ? turn(event, held) : shift(event, held);
   }
+  // Where the camera goes along with the robot, what is held stays under the pointer.
+  nmm.camera.moving = () => gizmos.held && drag(gizmos.held.event);
 
   function shift(event, held) {
     const at = under(event, held);
