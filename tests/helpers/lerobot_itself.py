@@ -64,6 +64,18 @@ def load(folder: Path, out: Path) -> dict[str, Any]:
     }
 
 
+def pictures(folder: Path, out: Path) -> dict[str, Any]:
+    """The pictures of all frames as LeRobot decodes them; what this installation lacks for it."""
+    data = opened(folder, video_backend="pyav")
+    try:
+        items = [data[k] for k in range(len(data))]
+    except (AttributeError, ImportError) as error:  # torchvision without its reader, no torchcodec
+        return {"lacks": str(error)}
+    keys = data.meta.video_keys
+    np.savez(out, **{key: np.array([item[key].numpy() for item in items]) for key in keys})
+    return {"keys": [*keys], "stats": plain({key: data.meta.stats[key] for key in keys})}
+
+
 def plain(stats: dict[str, Any]) -> dict[str, Any]:
     return {
         name: {key: np.asarray(value).tolist() for key, value in of.items()} for name, of in stats.items()
@@ -123,4 +135,5 @@ def finish(data: LeRobotDataset) -> None:
 
 if __name__ == "__main__":
     job, folder, out = sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3])
-    print(json.dumps({"load": load, "edit": edit, "record": record, "go_on": go_on}[job](folder, out)))
+    jobs = {"load": load, "edit": edit, "record": record, "go_on": go_on, "pictures": pictures}
+    print(json.dumps(jobs[job](folder, out)))

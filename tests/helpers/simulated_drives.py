@@ -28,6 +28,27 @@ def wander(p: int, seed: int = 0) -> Inputs:
     return inputs
 
 
+def two_wheels(t: Array) -> Array:
+    """Rates of two wheels (N, 2), rad/s, for curves to both sides, ahead and back."""
+    left = np.sin(0.3 * t) + 1.2 * np.sin(0.11 * t) + 0.3
+    return 5.0 * np.stack([left, np.sin(0.24 * t + 1.0) + 1.2 * np.sin(0.13 * t) + 0.3], axis=1)
+
+
+def steered(t: Array) -> Array:
+    """Speed, m/s, and rate of a steering angle, rad/s."""
+    return np.stack([0.6 + 0.3 * np.sin(0.2 * t), 0.25 * np.cos(0.45 * t)], axis=1)
+
+
+def every_way(t: Array) -> Array:
+    """Inputs of mecanum wheels, rad/s: drive, strafe and turn."""
+    return np.stack([3.0 * np.sin(0.3 * t) + 2.0, 3.0 * np.cos(0.2 * t), 2.0 * np.sin(0.35 * t)], axis=1)
+
+
+def tractor(t: Array) -> Array:
+    """Speed, m/s, and rate of turning, rad/s, of what pulls a trailer."""
+    return np.stack([0.5 + 0.3 * np.sin(0.5 * t), 0.4 * np.sin(0.3 * t)], axis=1)
+
+
 def placed(poses: Array, mount: Sequence[float]) -> Array:
     """Where a point of the body at `mount` (3,) is, (M, 3), while the body is at poses (M, 3)."""
     c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])

@@ -15,7 +15,7 @@ from nmm.base.errors import InputError, expect
 from nmm.base.plugins import OptionGroup
 from nmm.cli.groups import opening_command
 from nmm.cli.interrupts import shielded
-from nmm.cli.options import flag, names_of, option
+from nmm.cli.options import flag, named, names_of, option, size_of
 from nmm.cli.output import OK, show_table, show_text, warn
 
 if TYPE_CHECKING:
@@ -36,27 +36,44 @@ def export(
     start: float | None = option("S", "The clock's time at the run's t = 0, s since 1970.", show="0"),
     task: str | None = option("TEXT", "What is done, in a data set.", show="the scenario's title"),
     fps: int | None = option("N", "Frames a second of a data set.", show="30"),
+    video: str | None = option(
+        "FROM", "A data set's pictures, from iso, top, front or wall, or several: iso,top.", show="none"
+    ),
+    size: str | None = option("WxH", "Of a data set's pictures, px.", show="640x480"),
 ) -> int:
     """Write a run as a log that Foxglove, Rerun and ROS 2's tools open, or runs as a data set of LeRobot's.
 
     A log has joint states, TF, odometry, poses, twist, inputs, task error, paths, events, the robot's
     description (docs/ros.md); it needs pip install rosbags. A data set, v3.0, has states, actions and
-    targets in SI units, which it states (docs/data_sets.md); it needs pip install pyarrow.
+    targets in SI units, which it states (docs/data_sets.md); it needs pip install pyarrow, and its pictures
+    Chromium and pip install imageio-ffmpeg.
 
     \b
     nmm export runs/unicycle_2r_position-rg --mcap
     nmm export runs/unicycle_2r_position-rg --mcap here.mcap --start 1700000000
     nmm export runs/pick-* --lerobot picks --task "pick up the cube" --fps 20
+    nmm export runs/pick-* --lerobot picks --video front,top --size 320x240
     """
     if mcap == (lerobot is not None):
         raise InputError("say what to write", expected="--mcap or --lerobot DIR")
-    for name, value, fits in (("task", task, not mcap), ("fps", fps, not mcap), ("start", start, mcap)):
+    for name, value, fits in (
+        ("task", task, not mcap), ("fps", fps, not mcap), ("start", start, mcap),
+        ("video", video, not mcap), ("size", size, not mcap),
+    ):  # fmt: skip
         expect(value is None or fits, f"--{name}", f"--{'lerobot' if mcap else 'mcap'}, which it is of")
     if lerobot is None:
         return _write_log(folders, start or 0.0)
     from nmm.plugins.robot.lerobot.writing import write_lerobot
 
-    write_lerobot(_runs_of(folders), lerobot, task=task, fps=30 if fps is None else fps)
+    expect(size is None or video is not None, "--size", "--video, which it is of")
+    write_lerobot(
+        _runs_of(folders),
+        lerobot,
+        task=task,
+        fps=30 if fps is None else fps,
+        video=() if video is None else named(video, "--video"),
+        size=size_of(size or "640x480"),
+    )
     show_text(f"written: {lerobot}")
     return OK
 

@@ -30,17 +30,17 @@ FIRST = 256
 class LoopFindings:
     """Findings of a loop; what is found in one call after the other is one, with `samples` and its `end`."""
 
-    def __init__(self, apart: float) -> None:
-        self._apart = apart
+    def __init__(self, within: float) -> None:
+        self._within = within
         self._found: deque[tuple[str, dict[str, Any], float]] = deque(maxlen=FINDINGS)
 
-    def add(self, code: str, t: float, apart: float | None = None, **values: Any) -> None:
-        """Found at t, s; of numbers that go on the largest counts. It goes on if it is `apart` (s, the next
-        call or two unless given) from the last time."""
-        apart = self._apart if apart is None else apart
+    def add(self, code: str, t: float, within: float | None = None, /, **values: Any) -> None:
+        """Found at t, s; of numbers that go on the largest counts. It goes on if it is `within` so many s of
+        the last time, the next call or two unless given."""
+        within = self._within if within is None else within
         for known, earlier, _ in reversed(self._found):
             if known == code and all(earlier[name] == x for name, x in values.items() if _names(x)):
-                if t - earlier["end"] > apart:
+                if t - earlier["end"] > within:
                     break
                 numbers = {name: max(earlier[name], x) for name, x in values.items() if not _names(x)}
                 earlier.update(numbers, end=t, samples=earlier["samples"] + 1)

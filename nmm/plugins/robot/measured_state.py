@@ -101,6 +101,16 @@ class MeasuredState:
         allowed = jump.m <= self._tolerances.metres and jump.rad <= self._tolerances.radians
         return None if allowed else jump
 
+    @property
+    def q_odom(self) -> Array:
+        """q (n,) with the platform in the frame in which measurements go on without jumps."""
+        return self.q.copy() if self._frame is None else _carried(self.q, self._frame, np.zeros(3))
+
+    @property
+    def corrected(self) -> bool:
+        """Whether that frame is known."""
+        return self._frame is not None
+
     def move_on(self, since: float, until: float) -> None:
         """No measurement, but inputs, between two calls."""
         if self.at > -math.inf:

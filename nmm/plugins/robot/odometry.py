@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, matrix, scalar, vector
-from nmm.base.errors import InputError, expect_known, few, no_such
+from nmm.base.errors import InputError, expect_kind, expect_known, few, no_such
 from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.record_layout import Memory
 from nmm.base.text_format import apart
@@ -21,6 +21,8 @@ from nmm.plugins.robot.encoders import Encoders, JointReadings, Turns
 
 #: A counter may run so much faster than the fastest, and jump by that, rad or m: stamps are not exact.
 FASTER, JUMPS = 1.5, 0.1
+#: Between two readings no counter goes farther, rad or m, whatever the time.
+FARTHEST = 1e6
 #: Counters whose rows are less regular may leave inputs undetermined.
 DETERMINED = 1e-9
 
@@ -128,6 +130,8 @@ class Odometry:
         wrapped: bool | Collection[str] | None = None,
         t: float | None = None,
     ) -> None:
+        expect_kind(robot, Robot, "odometry: robot", "a Robot, as nmm.load gives it")
+        expect_kind(encoders, Mapping, f"odometry: {robot.name}: encoders", "readings by name")
         self._where = f"odometry: {robot.name}"
         if robot.platform.n_p < 3:
             raise InputError(where=self._where, expected="a platform that moves", got=robot.platform.name)
@@ -189,9 +193,10 @@ class Odometry:
         counts = self._turns.after(readings, most)
         by = [count - before for count, before in zip(counts, self._turns.counts, strict=True)]
         for k, way in enumerate(by):
-            if abs(way) > most[k]:
-                what = f"{self._counters.names[k]} jumped: it cannot turn so far in {lasted:.3g} s"
-                _, allowed = apart(abs(way), most[k], digits=3)
+            if abs(way) > min(most[k], FARTHEST):
+                within = "between two readings" if t is None else f"in {lasted:.3g} s"
+                what = f"{self._counters.names[k]} jumped: it cannot turn so far {within}"
+                _, allowed = apart(abs(way), min(most[k], FARTHEST), digits=3)
                 raise InputError(what, where=self._where, expected=f"at most {allowed}", got=way)
         self.last_counts[:] = by
         q, n_p = self.q, self.robot.platform.n_p
@@ -228,6 +233,8 @@ class Odometry:
 
     def _read(self, encoders: Mapping[str, float]) -> tuple[list[float], Array]:
         """The counters' readings, and q with the joints where they are measured."""
+        if not isinstance(encoders, dict):
+            expect_kind(encoders, Mapping, f"{self._where}: encoders", "readings by name")
         names = tuple(encoders)
         if names != self._names:
             self._name(names)

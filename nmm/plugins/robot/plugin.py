@@ -16,5 +16,6 @@ PLUGIN = Plugin(
         "nmm.plugins.robot.bag_findings:WORDS",
         "nmm.plugins.robot.calibration.findings:WORDS",
         "nmm.plugins.robot.calibration.log_findings:WORDS",
+        "nmm.plugins.robot.calibration.arm.findings:WORDS",
     ),
 )

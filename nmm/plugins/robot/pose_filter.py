@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.base.arrays import Array, array, counted, matrix, positive, scalar, vector
-from nmm.base.errors import InputError
+from nmm.base.errors import InputError, expect, expect_kind
 from nmm.base.kernels.compiled import checked_by_caller
 from nmm.base.kernels.record_layout import views
 from nmm.model.robots.robot import Robot
@@ -20,6 +20,10 @@ from nmm.plugins.robot.odometry import Odometry
 #: What became of a fix, by the codes of `filter_history`.
 OUTCOMES = ("waiting", "used", "outlier", "late", "early", "crowded")
 _POSES = (2,), (3,)
+#: No gyro turns faster, rad/s: a rate in degrees may.
+FASTEST_TURN = 100.0
+#: So much is remembered at most: readings and fixes.
+MOST_STEPS, MOST_FIXES = 1_000_000, 10_000
 
 
 class PoseFilter:
@@ -64,7 +68,8 @@ class PoseFilter:
 
     Raises
     ------
-    InputError : what `Robot.odometry` refuses; matrices that are no covariances; numbers out of range
+    InputError : what `Robot.odometry` refuses; matrices that are no covariances; numbers out of range; more
+        to remember than a million readings or 10,000 fixes
 
     Source: A. Barrau, S. Bonnabel, The invariant extended Kalman filter as a stable observer, IEEE Trans.
     Automatic Control 62(4), 2017.
@@ -108,6 +113,7 @@ class PoseFilter:
         fastest: float | Mapping[str, float] | None = None,
         wrapped: bool | Collection[str] | None = None,
     ) -> None:
+        expect_kind(robot, Robot, "PoseFilter: robot", "a Robot, as nmm.load gives it")
         self._where = where = f"PoseFilter: {robot.name}"
         self.robot = robot
         t = scalar(t, f"{where}: t")
@@ -120,9 +126,13 @@ class PoseFilter:
             "turn": (turn_deviation, turn_walk),
         }
         noise, P = noise_of(self._odometry, where, spread, slip_noise, gyro_noise, walking)
-        seconds = positive(delay, f"{where}: delay")
-        steps = math.ceil(seconds * positive(rate, f"{where}: rate")) + 2
+        seconds, rate = positive(delay, f"{where}: delay"), positive(rate, f"{where}: rate")
+        if (remembered := seconds * rate) > MOST_STEPS:
+            what = f"{remembered:.3g} readings would be remembered"
+            raise InputError(what, where=f"{where}: delay, rate", expected=f"at most {MOST_STEPS:,}")
+        steps = math.ceil(remembered) + 2
         places = counted(fixes, f"{where}: fixes")
+        expect(places <= MOST_FIXES, f"{where}: fixes", f"at most {MOST_FIXES:,}", places)
         gates = np.full(2, np.inf)
         if gate is not None:
             gates[:] = gates_of(scalar(gate, f"{where}: gate", above=0.0, below=1.0))
@@ -157,7 +167,7 @@ class PoseFilter:
         ----------
         encoders : as for `Odometry.update`
         t : when they were read, s, later than before
-        yaw_rate : mean of the gyro since then, rad/s, about z; None where there is none
+        yaw_rate : mean of the gyro since then, rad/s, about z, within ±100; None where there is none
 
         Raises
         ------
@@ -199,7 +209,7 @@ class PoseFilter:
         where = f"{self._where}: yaw_rate"
         if not self._has_gyro:
             raise InputError(where=where, expected="a filter with gyro_noise", got=yaw_rate)
-        return t, scalar(yaw_rate, where)
+        return t, scalar(yaw_rate, where, least=-FASTEST_TURN, most=FASTEST_TURN)
 
     def _take(self, t: float, by: Array, joints: Array, yaw_rate: float) -> None:
         if not self._advance(*self._blocks, t, by, joints, yaw_rate):

@@ -151,6 +151,17 @@ class Loop:
         return self._measured.q.copy()
 
     @property
+    def q_odom(self) -> Array:
+        """(n,) the same with the platform in odom, where the fixes of a `PoseFilter` move nothing; q itself
+        where measurements come from no such filter."""
+        return self._measured.q_odom
+
+    @property
+    def corrected(self) -> bool:
+        """Whether measurements come from a `PoseFilter`, q then being in its map."""
+        return self._measured.corrected
+
+    @property
     def age(self) -> float:
         """Time since the last measurement that was used, s; infinite before the first."""
         return self.t - self._measured.at

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.simulated_drives import composed, drive, placed
+from helpers.simulated_drives import composed, drive, every_way, placed, steered, tractor, two_wheels
 from scipy.optimize import least_squares
 
 import nmm
@@ -24,27 +25,13 @@ CLOCK = {"clock": 0.0}
 LEFT, RIGHT = "radius.left_wheel_joint", "radius.right_wheel_joint"
 
 
-def two_wheels(t: Array) -> Array:
-    left = np.sin(0.3 * t) + 1.2 * np.sin(0.11 * t) + 0.3
-    return 5.0 * np.stack([left, np.sin(0.24 * t + 1.0) + 1.2 * np.sin(0.13 * t) + 0.3], axis=1)
-
-
-def car(t: Array) -> Array:
-    return np.stack([0.6 + 0.3 * np.sin(0.2 * t), 0.25 * np.cos(0.45 * t)], axis=1)
-
-
-def every_way(t: Array) -> Array:
-    return np.stack([3.0 * np.sin(0.3 * t) + 2.0, 3.0 * np.cos(0.2 * t), 2.0 * np.sin(0.35 * t)], axis=1)
-
-
-def tractor(t: Array) -> Array:
-    return np.stack([0.5 + 0.3 * np.sin(0.5 * t), 0.4 * np.sin(0.3 * t)], axis=1)
-
-
 #: Of a robot the numbers that it truly has, and its inputs.
 TRUTHS: dict[str, tuple[dict[str, float], Callable[[Array], Array]]] = {
     "differential_base": ({LEFT: 0.097, RIGHT: 0.102, "track": 0.56}, two_wheels),
-    "car_base": ({"wheelbase": 0.74, "track": 0.58, "offset.steering": 0.03, "ratio.steering": 1.04}, car),
+    "car_base": (
+        {"wheelbase": 0.74, "track": 0.58, "offset.steering": 0.03, "ratio.steering": 1.04},
+        steered,
+    ),
     "omni_base": ({"radius.front_left_wheel_joint": 0.098, "half_length_plus_width": 0.53}, every_way),
     "trailer_base": ({LEFT: 0.101, "track": 0.46, "H1": 0.27, "L1": 0.66, "L2": 0.74}, tractor),
 }
@@ -74,6 +61,8 @@ def off(found: nmm.Calibration, truth: dict[str, float]) -> dict[str, float]:
         | truth
     )
     numbers = found.numbers
+    for kind in ("delay", "clock"):  # of several drives
+        known |= {n: known.get(n, known[kind]) for n in numbers if n.startswith(f"{kind}.")}
     return {n: (numbers[n].after - known[n]) / numbers[n].deviation for n in found.learned}
 
 
@@ -102,7 +91,11 @@ def test_the_robots_own_numbers_come_back(name: str) -> None:
 
 
 def test_noise_is_what_was_put_in() -> None:
-    noise = calibration(place=0.004, heading=0.002, slip=0.03).noise
+    found = calibration(place=0.004, heading=0.002, slip=0.03)
+    noise, as_filters = found.noise, found.filter_noise
+    assert as_filters["spread"] == pytest.approx(0.03**2, rel=0.3)
+    still, P = {"left_wheel_joint": 0.0, "right_wheel_joint": 0.0}, np.eye(3)
+    nmm.PoseFilter(found.calibrated, found.robot.rest, still, 0.0, covariance=P, **as_filters)
     assert noise.place == pytest.approx(0.004, rel=0.15)
     assert noise.heading == pytest.approx(0.002, rel=0.15)
     assert noise.counters == pytest.approx(0.03, rel=0.15)
@@ -174,11 +167,78 @@ def test_positions_are_enough() -> None:
 
 
 def test_drives_with_several_looks_count_together() -> None:
-    logs = [log_of(seed=i, seconds=30.0, name=f"drive {i}", looks=looks) for i, looks in enumerate((10, 5))]
+    logs = [
+        log_of(seed=i, seconds=30.0, name=f"drive {i}", looks=looks, inputs=after(30.0 * i))
+        for i, looks in enumerate((10, 5))
+    ]
     both = nmm.calibrate(robot_of(), logs)
     one = nmm.calibrate(robot_of(), logs[0])
     assert max(map(abs, off(both, TRUTHS["differential_base"][0]).values())) < 5.0
     assert both.numbers["track"].deviation < one.numbers["track"].deviation
+
+
+def after(seconds: float) -> Callable[[Array], Array]:
+    """What the wheels do later."""
+    return lambda t: two_wheels(t + seconds)
+
+
+def test_each_drive_has_its_own_delay() -> None:
+    late = {"delay.1": 0.03, "delay.2": 0.28}
+    logs = [
+        log_of(seed=i, seconds=30.0, delay=delay, inputs=after(30.0 * i))
+        for i, delay in enumerate(late.values())
+    ]
+    found = nmm.calibrate(robot_of(), logs)
+    assert {*late} <= {*found.learned}
+    assert max(map(abs, off(found, TRUTHS["differential_base"][0] | late).values())) < 5.0
+    assert found.whiteness > 1e-4
+
+
+def test_delays_of_all_drives_or_of_one_are_held() -> None:
+    logs = [log_of(seed=i, seconds=10.0, inputs=after(10.0 * i)) for i in range(2)]
+    found = nmm.calibrate(robot_of(), logs, hold={"delay": 0.03, "delay.2": 0.02, "clock": None})
+    held = {name: number.after for name, number in found.numbers.items() if number.why == "held"}
+    assert held == {"delay.1": 0.03, "delay.2": 0.02, "clock.1": 0.0, "clock.2": 0.0}
+    with pytest.raises(InputError, match=r"delay\.2"):
+        nmm.calibrate(robot_of(), logs, hold=["delay.3"])
+
+
+def test_a_drive_that_stands_still_at_last_is_calibrated() -> None:
+    """What is held out has no window to go along."""
+    log = log_of(inputs=lambda t: two_wheels(t) * (t < 12.0)[:, np.newaxis], seconds=30.0)
+    found = nmm.calibrate(robot_of(), log)
+    assert found.held_out is None
+    assert max(map(abs, off(found, TRUTHS["differential_base"][0]).values())) < 5.0
+
+
+def test_counters_that_are_only_rolled_along_are_not_made_smaller_by_their_noise() -> None:
+    """Front wheels of a car whose encoders slip (they do not move it) are compared with the others over long
+    windows: by looks 0.05 s apart, their radii seemed smaller by the noise's share, together by 7 of their
+    deviations."""
+    log, rng = log_of("car_base", slip=0.0, looks=20.0, seconds=120.0), np.random.default_rng(0)
+    front = ("front_left_wheel_joint", "front_right_wheel_joint")
+    readings = dict(log.readings)
+    for name in front:
+        steps = np.diff(readings[name], prepend=readings[name][0])
+        readings[name] = readings[name] + np.cumsum(
+            0.04 * np.sqrt(np.abs(steps)) * rng.normal(size=len(steps))
+        )
+    slipping = nmm.DriveLog(log.name, log.t, readings, log.reference_t, log.reference, log.kind)
+    found = nmm.calibrate(robot_of("car_base"), slipping)
+    far = off(found, TRUTHS["car_base"][0])
+    assert abs(sum(far[f"radius.{name}"] for name in front)) < 4.0
+
+
+def test_ten_minutes_at_100_hz_take_no_more_than_four_times_their_memory() -> None:
+    log = log_of("car_base", seconds=600.0, rate=100.0, looks=100.0)
+    arrays = (log.t, log.reference_t, log.reference, *log.readings.values())
+    nmm.calibrate(robot_of("car_base"), log_of("car_base", seconds=5.0))  # what is loaded once
+    tracemalloc.start()
+    found = nmm.calibrate(robot_of("car_base"), log)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 4.0 * sum(array.nbytes for array in arrays)
+    assert found.held_out is not None
 
 
 def with_reference(log: nmm.DriveLog, t: Array, seen: Array) -> nmm.DriveLog:
@@ -298,6 +358,15 @@ def test_a_saved_calibration_is_loaded_with_the_robot(tmp_path: Path) -> None:
         nmm.load("unicycle_2r", calibration=found)
 
 
+def test_a_number_of_an_earlier_calibration_that_is_held_stays_in_the_file(tmp_path: Path) -> None:
+    before = nmm.with_numbers(robot_of(), {"track": 0.53})
+    found = nmm.calibrate(before, log_of(), hold="track")
+    found.save(tmp_path / "calibration.yaml")
+    loaded = nmm.load("differential_base", calibration=tmp_path / "calibration.yaml")
+    assert loaded.changed_numbers == pytest.approx(dict(found.calibrated.changed_numbers))
+    assert loaded.changed_numbers["track"] == 0.53
+
+
 def test_a_calibration_of_positions_or_of_closed_drives_is_saved_too(tmp_path: Path) -> None:
     squares = [closed(1.0, 0), closed(-1.0, 1)]
     for found in (calibration(kind="positions"), nmm.calibrate(robot_of(), squares)):
@@ -338,7 +407,7 @@ def test_a_receiver_of_satellites_is_no_other_unit() -> None:
 
 
 def test_poses_and_positions_go_together() -> None:
-    positions = log_of(name="positions", kind="positions", seed=3, seconds=30.0)
+    positions = log_of(name="positions", kind="positions", seed=3, seconds=30.0, inputs=after(30.0))
     found = nmm.calibrate(robot_of(), [log_of(name="poses", seconds=30.0), positions])
     assert "reference.yaw" in found.learned
     assert max(map(abs, off(found, TRUTHS["differential_base"][0]).values())) < 5.0
@@ -364,7 +433,8 @@ def test_encoders_that_said_nothing_for_long_are_told() -> None:
 
 
 def test_counted_inputs_are_told_to_be_the_logs_own() -> None:
-    robot = nmm.load("unicycle_2r")
+    """Of an arm, which wheels do not show, what was known stays."""
+    robot = nmm.with_numbers(nmm.load("unicycle_2r"), {"offset.q1": 0.1, "origin.ee.x": 0.02})
     t = np.linspace(0.0, 40.0, 2001)
     v, omega = 0.4 + 0.2 * np.sin(0.5 * t), 0.5 * np.sin(0.3 * t)
     counts = {"v": np.cumsum(v) * 0.02, "omega": np.cumsum(omega) * 0.02}
@@ -374,6 +444,10 @@ def test_counted_inputs_are_told_to_be_the_logs_own() -> None:
     assert found.numbers["scale.v"].after == pytest.approx(1.04, abs=0.005)
     assert found.numbers["scale.omega"].after == pytest.approx(0.97, abs=0.005)
     assert "of_the_log" in codes(found)
+    assert not any(name.startswith(("offset.", "ratio.", "origin.")) for name in found.numbers)
+    assert {"offset.q1": 0.1, "origin.ee.x": 0.02}.items() <= {
+        name: number.value for name, number in found.file().numbers.items()
+    }.items()
 
 
 def changed(log: nmm.DriveLog, **readings: Callable[[Array], Array]) -> nmm.DriveLog:

@@ -185,7 +185,12 @@ ERRORS = [
     ((*SI, "--hold", "track=far"), "--hold: track: unknown name 'far'"),
     ((*SI, "--hold", "=0.5"), "--hold: expected NAME or NAME=VALUE"),
     ((*SI, "--hold", "track", "--hold", "track=1"), "--hold: track is given twice"),
-    ((*SI, "--hold", "track=-1"), "track: expected a number above 0, got -1"),
+    ((*SI, "--hold", "track=-1"), "hold track: expected 0.15 to 1.5 m, got -1"),
+    ((*SI, "--hold", "track=1e308"), "hold track: expected 0.15 to 1.5 m, got 1e+308"),
+    ((*SI, "--hold", "clock=1"), "hold clock: expected -0.01 to 0.01, got 1"),
+    ((*SI, "--columns", f"{LEFT}={RIGHT},{RIGHT}={LEFT}"), f"with {LEFT} and {RIGHT} swapped"),
+    ((*SI, "--columns", f"{LEFT}={RIGHT}"), f"{LEFT} and {RIGHT} count the same"),
+    (("drive.csv", *SI), "drive.csv and drive.csv have the same counts at the same stamps"),
     ((*SI, "--joints", "/joints"), "--joints: it is of bags, and all logs are tables"),
     ((*SI, "--wrapped", "left_wheel_joint=x"), "--wrapped: left_wheel_joint: expected a number, or no"),
     ((*SI, "--shift", "100"), "the reference's stamps begin 100 s after the counters'"),
@@ -225,22 +230,70 @@ def test_a_log_that_stands_still_and_wheels_of_others(
     assert result.status == 2
 
 
+@pytest.mark.parametrize("during", ["fit", "held_out"])
 def test_an_interrupt_leaves_nothing(
-    tables: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    during: str, tables: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tables)
 
     def interrupted(*_: object) -> object:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(learning, "held_out", interrupted)
+    monkeypatch.setattr(learning, during, interrupted)
     result = refused(capfd, "calibrate", "differential_base", "drive.csv", *SI, "--out", "never")
     assert result.status == 130
     assert not (tables / "never").exists()
     assert not result.out
 
 
-def test_bags_and_closed_drives_are_logs_too(
+def square(file: Path, sign: float, seed: int) -> None:
+    """A table of a square of 3 m that closes, of a robot with a track of 0.52 m."""
+    legs = np.array([[3.0, 0.0], [0.0, sign * np.pi / 2.0]] * 4)
+    steps = np.repeat(legs / 100.0, 100, axis=0)
+    ways = np.stack([steps[:, 0] - 0.26 * steps[:, 1], steps[:, 0] + 0.26 * steps[:, 1]], axis=1) / 0.1
+    ways += 0.005 * np.random.default_rng(seed).normal(size=ways.shape) * np.sqrt(np.abs(ways))
+    counts = np.vstack([[0.0, 0.0], np.cumsum(ways, axis=0)])
+    rows = np.column_stack([0.05 * np.arange(len(counts)), counts])
+    np.savetxt(file, rows, header=f"t,{LEFT},{RIGHT}", delimiter=",", comments="")
+
+
+def test_closed_squares_teach_the_track_beside_umbmarks_report(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for i in range(4):
+        square(Path(f"{i}.csv"), (-1.0) ** i, i)
+    files = [f"{i}.csv" for i in range(4)]
+    given = ("--reference", "closed", "--units", "wheels=rad,time=s", "--json", "--out", "out")
+    result = run(capfd, "differential_base", *files, *given)
+    assert result.status == 0, result.err
+    told = json.loads(result.out)["numbers"]
+    assert abs(told["track"]["after"] - 0.52) < 4.0 * told["track"]["deviation"] < 0.02
+    assert told["track"]["why"] == "learned"
+    rows = report.umbmark_rows(nmm.load("differential_base"), logs_of(files))
+    capfd.readouterr()
+    result = run(capfd, "differential_base", *files, *given[:4], "--out", "out")
+    assert result.value("UMBmark") == rows[0][1]
+    assert abs(float(rows[0][1].split("E_b ")[1].split(",")[0]) - 1.04) < 0.01
+
+
+def logs_of(files: list[str]) -> list[nmm.DriveLog]:
+    robot, units = nmm.load("differential_base"), {"wheels": "rad", "time": "s"}
+    return [nmm.DriveLog.from_csv(file, robot, units=units, ends="closed") for file in files]
+
+
+def test_a_drive_that_does_not_close_is_offered_to_no_file(
+    tables: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tables)
+    given = ("--reference", "closed", "--units", "wheels=rad,time=s", "--out", "closed")
+    result = run(capfd, "differential_base", "drive.csv", *given)
+    assert result.status == 2, result.out
+    assert "expected drives that end on the marks" in result.err
+    assert not (tables / "closed").exists()
+
+
+def test_bags_are_logs_too(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """A simulated run's bag, with a localisation in TF."""

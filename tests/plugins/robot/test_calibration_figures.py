@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
-from simulated_drives import drive
+from simulated_drives import Inputs, drive
 
 import nmm
 from nmm.plugins.robot.calibration import figures
@@ -23,12 +23,17 @@ def curves(t: np.ndarray) -> np.ndarray:
     return np.stack([v - w, v + w], axis=1)
 
 
+def later(seconds: float) -> Inputs:
+    return lambda t: curves(t + seconds)
+
+
 @pytest.fixture(scope="module")
 def found() -> nmm.Calibration:
     """Of two drives; in the second one look is off, and then the reference jumps."""
     robot = nmm.load("differential_base")
     first, second = (
-        drive(robot, TRUTH, inputs=curves, seconds=30.0, rate=25.0, looks=5.0, seed=seed) for seed in (1, 2)
+        drive(robot, TRUTH, inputs=later(seed), seconds=30.0, rate=25.0, looks=5.0, seed=seed)
+        for seed in (1, 2)
     )
     seen = second.reference.copy()
     seen[40] += [0.5, 0.4, 0.0]
@@ -120,8 +125,8 @@ def test_nothing_learned_and_many_drives(found: nmm.Calibration, tmp_path: Path)
     style.save(figures.correlation(bare), tmp_path / "none.png")
     robot = nmm.load("differential_base")
     logs = [
-        drive(robot, TRUTH, inputs=curves, seconds=8.0, rate=25.0, looks=5.0, seed=seed, name=f"drive {seed}")
-        for seed in range(6)
+        drive(robot, TRUTH, inputs=later(n), seconds=8.0, rate=25.0, looks=5.0, seed=n, name=f"drive {n}")
+        for n in range(6)
     ]
     many = nmm.calibrate(robot, logs)
     titles = [axes.get_title(loc="left") for axes in figures.path(many).axes]

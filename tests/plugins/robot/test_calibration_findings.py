@@ -31,15 +31,15 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
     ("of_the_log", {"names": ["scale.v", "scale.omega"]}, {},
      "scale.v and scale.omega are of the log's own counts, no "
      "numbers of the robot: an odometry takes them as slip="),
-    ("delays_differ", {"least": 0.02, "most": 0.41}, {},
-     "the reference's clock is 0.02 to 0.41 s behind in these "
-     "drives, and one delay is learned: calibrate by each of them"),
     ("counters_silent", {"log": "a.csv", "count": 2}, {},
      "a.csv: the encoders said nothing for long 2 times: begun anew after it"),
     ("looks_left_out", {"log": "a.csv", "count": 1, "all": 600}, {"t": 3.0},
      "a.csv: 1 look of 600 of the reference left out, which no noise explains, first at 3 s"),
     ("reference_jumped", {"log": "a.csv", "count": 1}, {"t": 3.0},
      "a.csv: the reference jumped 1 time, first at 3 s: begun anew there"),
+    ("reference_twisted", {"log": "a.csv from 3 s", "by": 0.3}, {"t": 3.0},
+     "a.csv from 3 s: the reference's heading jumped, 0.3 rad beside the rest, and its "
+     "place did not: its headings are not used there"),
     ("looks_thinned", {"log": "a.csv", "every": 3, "count": 200}, {},
      "a.csv: one of 3 looks of the reference is used, 200 in all"),
     ("not_white", {"p": 1e-5}, {},
@@ -49,8 +49,8 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
      "over 15 windows of 2.2 m that were not learned from, dead reckoning by the new "
      "numbers: no difference (0.0085 m off after 0.008 m, p = 0.4)"),
     ("no_held_out", {}, {}, "the drives are too short for a part of them to be held out"),
-    ("clocks_apart", {"rate": 18.0, "faster": False, "apart": 30.0}, {},
-     "the reference's clock runs 18 ms a minute slower than the encoders': 30 ms over the drive"),
+    ("clocks_apart", {"log": "a.csv", "rate": 18.0, "faster": False, "apart": 30.0}, {},
+     "a.csv: the reference's clock runs 18 ms a minute slower than the encoders': 30 ms over the drive"),
 ]  # fmt: skip
 
 

@@ -107,7 +107,8 @@ def filtered(z: Array, rows: int, taken: Array, R: Array, n: int = 1, **given: A
     mount = given.get("mount", MOUNT)
     call = checked_by_caller(innovations, INNOVATIONS)
     call(
-        given.get("motions", MOTIONS), slopes, noises(), z, taken, np.tile(R, (many, 1)), mount, columns, *out
+        *(given.get("motions", MOTIONS), slopes, 0.25 * noises()[:, np.newaxis], np.array([4.0]), z, taken),
+        *(np.tile(R, (many, 1)), mount, columns, *out),
     )
     return out
 

@@ -132,7 +132,9 @@ def applied(text: str, diff: str) -> str:
 def test_files_of_real_robots(file: str, lines: int, tmp_path: Path) -> None:
     """A differential base and a mecanum one, whose joints are turned and hang on suspensions."""
     robot = nmm.load(DATA + file, missing_meshes="skip")
-    values = {name: number.value * 1.003 for name, number in nmm.robot_numbers(robot).items()}
+    arm = {*robot.q_names[robot.platform.n_p :]}
+    numbers = nmm.robot_numbers(robot)
+    values = {name: number.value * 1.003 for name, number in numbers.items() if number.of not in arm}
     patch = nmm.description_patch(nmm.with_numbers(robot, values))
     assert patch.left == {}
     added = [line for line in patch.diff.splitlines() if line.startswith("+") and line[1] != "+"]
@@ -140,7 +142,7 @@ def test_files_of_real_robots(file: str, lines: int, tmp_path: Path) -> None:
     assert all("radius=" in line or "<origin" in line for line in added)
     corrected, _ = patch.save(tmp_path)
     found = by_file(corrected, missing_meshes="skip")
-    assert found == pytest.approx(values, rel=1e-6)
+    assert {name: found[name] for name in values} == pytest.approx(values, rel=1e-6)
     before = source_path(robot.source, ()).read_bytes().splitlines()
     after = corrected.read_bytes().splitlines()
     assert len(before) == len(after)

@@ -249,6 +249,8 @@ def test_bad_input_is_named_and_changes_nothing() -> None:
         (lambda: pose_filter.step(0.2, [0.1, 0.1], "a"), "2 counters and 0 joints"),
         (lambda: with_gyro.step(0.2, [0.1, 0.1], yaw_rate="x"), "numbers"),
         (lambda: with_gyro.step(0.2, [0.1, 0.1], yaw_rate=math.nan), "finite numbers"),
+        (lambda: with_gyro.step(0.2, [0.1, 0.1], yaw_rate=1e308), "a number from -100 to 100"),
+        (lambda: with_gyro.update(None, 0.2), "readings by name"),  # type: ignore[arg-type]  # on purpose
         (lambda: with_gyro.update(STILL, 0.2, "x"), "numbers"),  # type: ignore[arg-type]  # on purpose
         (lambda: pose_filter.update({"left_wheel_joint": 0.1}, 0.2), ""),
         (lambda: pose_filter.fix([0.0], np.eye(1), 0.1), "2 or 3 numbers"),
@@ -265,6 +267,9 @@ def test_bad_input_is_named_and_changes_nothing() -> None:
         (lambda: make(spread=-1.0), "numbers from 0"),
         (lambda: make(slip_noise=(0.01, -0.01, 0.01)), "numbers from 0"),
         (lambda: make(delay=0.0), "a number above 0"),
+        (lambda: make(delay=1e300), "at most 1,000,000"),
+        (lambda: make(fixes=10**9), "at most 10,000"),
+        (lambda: nmm.PoseFilter("base", [], {}, 0.0, covariance=np.eye(3), spread=0.1), "a Robot"),  # type: ignore[arg-type]
         (lambda: make(spread={"wheel": 1.0}), ""),
     ]
     for call, expected in cases:

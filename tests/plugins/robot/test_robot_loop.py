@@ -133,6 +133,8 @@ def test_old_positions_with_new_times_take_no_joint_far_beyond_its_limits(by: fl
         assert tried.codes[-2:] == ("not_following", "stopped")
         (found,) = (one for one in tried.loop.findings if one.code == "not_following")
         assert found.values["name"] == "q1"
+        assert found.values["apart"] > 0.0
+        assert "q1 is measured" in str(found)
     trusting = to_its_limit()
     loop = nmm.Loop(trusting.controller, PERIOD, slip=None, outside=None)
     assert drive(loop, 6.0, old(0.5)).broken > 0.3

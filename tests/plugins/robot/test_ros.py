@@ -237,15 +237,20 @@ def test_a_part_that_comes_no_more_is_noticed() -> None:
     assert states.joints["q1"] == 0.3
 
 
-@pytest.mark.parametrize("name", [pytest.param("unicycle_3r", marks=pytest.mark.thorough), "cart"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("unicycle_3r", marks=pytest.mark.thorough), "cart", "calibrated cart"]
+)
 def test_the_node_s_logic_leads_a_robot_by_messages_alone(name: str, tmp_path: Path) -> None:
     """docs/tutorials/follow.py: its robot is q_dot = S(q) u, which gets and sends messages. The cart is a car
-    that steers as v and ω ask, with a mimic joint; its joints come in two messages, with others."""
+    that steers as v and ω ask, with a mimic joint; its joints come in two messages, with others. A
+    calibrated one's drivers are told what its encoders read."""
     folder = ROOT / "docs" / "tutorials"
     compile((folder / "ros_node.py").read_text("utf-8"), "ros_node.py", "exec")
     found = runpy.run_path(str(folder / "follow.py"))
-    car, dt = name == "cart", 0.01
+    car, dt = name.endswith("cart"), 0.01
     robot = nmm.load(cart(tmp_path / "cart.urdf", mimic=True) if car else name)
+    if name.startswith("calibrated"):
+        robot = nmm.with_numbers(robot, {"ratio.lift": -1.0, "offset.bend": 0.1, "origin.tilt.x": 0.02})
     messages, frame = nmm.ros.Messages(robot, STORE.types), "grasp" if car else "ee"
     follow = found["Follow"](robot, frame, messages)
     q = robot.q({"lift": 0.6, "bend": 0.9, "tilt": 0.4} if car else {"q2": 0.6, "q3": 0.8, "theta": 9.0})

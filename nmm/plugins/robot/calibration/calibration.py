@@ -4,69 +4,38 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
-from nmm.base.arrays import Array, scalar
-from nmm.base.errors import InputError, expect_known
+from nmm.base.arrays import Array
+from nmm.base.errors import InputError, expect, expect_kind
 from nmm.base.findings import Finding
 from nmm.base.progress import Progress
 from nmm.model.robots.numbers import with_numbers
 from nmm.model.robots.robot import Robot
+from nmm.plugins.robot.calibration.arm.calibration import ArmCalibration, calibrate_arm
+from nmm.plugins.robot.calibration.arm.sightings import Sightings
+from nmm.plugins.robot.calibration.checks import check_alike, check_ends, check_logs, check_numbers
 from nmm.plugins.robot.calibration.doubts import of_drives, of_numbers, of_rest
 from nmm.plugins.robot.calibration.drive_log import DriveLog
 from nmm.plugins.robot.calibration.drives import (
-    RobotDrive,
     counters_of,
     drive_of,
     first_delay,
-    path,
     used_looks,
 )
 from nmm.plugins.robot.calibration.fit import Fit, fit
-from nmm.plugins.robot.calibration.judged import (
-    HeldOut,
-    held_out,
-    whiteness,
-)
+from nmm.plugins.robot.calibration.held import asked_to_hold, held_delay, held_numbers
+from nmm.plugins.robot.calibration.judged import HeldOut, held_out, whiteness
+from nmm.plugins.robot.calibration.kept import Hold, file_of
+from nmm.plugins.robot.calibration.mixed_up import check_mixed_up
 from nmm.plugins.robot.calibration.model import DriveNoise, Model
-from nmm.plugins.robot.calibration.parameters import DELAY
-from nmm.plugins.robot.odometry import Counters
+from nmm.plugins.robot.calibration.mounting import check_mounting
+from nmm.plugins.robot.calibration.parameters import LearnedNumber
 from nmm.scenario.calibration_file import CalibrationFile
-
-#: The reference goes about as far as the wheels: a share beyond these is another unit.
-LEAST_SHARE, MOST_SHARE = 0.3, 3.0
-#: Wheels that roll are not so far off, rad for a rad turned.
-LOOSEST = 0.3
-
-
-@dataclass(frozen=True)
-class LearnedNumber:
-    """A number, before and after.
-
-    Attributes
-    ----------
-    before : by the robot's file, or 0 for what is none of the robot's
-    after : learned, or what it was held at
-    deviation : standard deviation of it, 0 where it was held
-    unit : "m", "rad", "s" or "1"
-    why : "learned"; "held" as was asked; "not shown" by the drives
-
-    Examples
-    --------
-    >>> track = nmm.LearnedNumber(before=0.5, after=0.56, deviation=0.004, unit="m", why="learned")
-    >>> round((track.after - track.before) / track.deviation)
-    15
-    """
-
-    before: float
-    after: float
-    deviation: float
-    unit: str
-    why: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +83,13 @@ class Calibration:
         """The robot with the numbers that were learned: odometry, inputs and wheels move by them."""
         return with_numbers(self.robot, self.model.numbers(self.fit.values))
 
+    @property
+    def filter_noise(self) -> dict[str, Any]:
+        """The wheels' noise that the drives showed, as `nmm.PoseFilter` takes it: `spread`, rad²/rad, and
+        `slip_noise`, m/√m along and across, rad/√rad."""
+        noise = self.noise
+        return {"spread": noise.counters**2, "slip_noise": (0.0, noise.across, noise.turns)}
+
     def applied(self, robot: Robot) -> Robot:
         """A robot of the same file with the numbers that were learned, as `nmm.load(file, calibration=)`
         makes it."""
@@ -139,8 +115,7 @@ class Calibration:
         if not math.isnan(self.whiteness):
             measured["whiteness"] = self.whiteness
         measured["findings"] = [str(finding) for finding in self.findings]
-        deviations = {name: self.numbers[name].deviation for name in own}
-        return CalibrationFile.of(self.robot, own, deviations, measured=measured, logs=self.logs)
+        return file_of(self.robot, own, self.numbers, measured, self.logs)
 
     def save(self, path: str | Path) -> None:
         """Write calibration.yaml, which `nmm.load(file, calibration=path)` takes."""
@@ -152,30 +127,63 @@ class Calibration:
         return [name for name, number in self.numbers.items() if number.why == "learned"]
 
 
+@overload
 def calibrate(
     robot: Robot,
     logs: DriveLog | Sequence[DriveLog],
-    hold: Mapping[str, float | None] | Collection[str] = (),
+    hold: Hold = (),
     progress: Progress | None = None,
-) -> Calibration:
-    """Learn wheels' radii, track, wheelbase, steering angles, centres of rotation from drives beside a
-    reference.
+    *,
+    ratios: Collection[str] | bool = (),
+) -> Calibration: ...
 
-    A Kalman filter predicts each look of the reference by the robot's own odometry; numbers, noise of the
-    wheels and of the reference are those of the greatest likelihood. What the drives do not show is held, and
-    said. Looks that no noise explains are left out, and where the reference jumps the filter begins anew.
+
+@overload
+def calibrate(
+    robot: Robot,
+    logs: Sightings | Sequence[Sightings],
+    hold: Hold = (),
+    progress: Progress | None = None,
+    *,
+    ratios: Collection[str] | bool = (),
+) -> ArmCalibration: ...
+
+
+def calibrate(
+    robot: Robot,
+    logs: DriveLog | Sightings | Sequence[DriveLog] | Sequence[Sightings],
+    hold: Hold = (),
+    progress: Progress | None = None,
+    *,
+    ratios: Collection[str] | bool = (),
+) -> Calibration | ArmCalibration:
+    """Learn a platform's wheels, track, wheelbase and steering from drives beside a reference; or an arm's
+    joint zeros, the placements of its joints and of its cameras from sightings.
+
+    Of drives a Kalman filter predicts each look of the reference by the robot's own odometry; numbers, noise
+    of the wheels and of the reference are those of the greatest likelihood. Looks that no noise explains are
+    left out, and where the reference jumps the filter begins anew. Of sightings, numbers are those of least
+    squares, where mounts of what sees and of what is seen are found first, by closed forms. What logs do not
+    show is held, and said.
 
     Parameters
     ----------
-    logs : one or several drives
+    logs : one or several drives; or one or several sightings
     hold : names of numbers to keep as they are, or values to keep them at, None for what they are: {"track":
-        0.5, "delay": None}
+        0.5, "delay": None}; delay and clock are those of all drives; of an arm also groups of names:
+        "origin", "origin.elbow", "tracker"
     progress : called with the fraction done
+    ratios : of an arm, joints whose gear ratio is learned, too; True for all. By default only the sign is
+        looked for, where nothing fits otherwise
 
     Raises
     ------
-    InputError : no counters of the platform, a drive that stands still, clocks more than a second apart, a
-        reference or wheels in other units or with other signs, an unknown name
+    InputError : no counters of the platform, a drive that stands still, clocks more than a second apart,
+        wheels or a reference in other units, with other signs or swapped (with what would fit), a reference
+        that was moved on the robot, drives that do not end where they are said to, a log that is given twice,
+        an unknown name, a value to hold at that no such robot has; of sightings no readings of a
+        joint, readings that cannot be, fewer samples than numbers, an arm that stood still, or that does not
+        fit to what was seen at all
 
     Examples
     --------
@@ -190,30 +198,46 @@ def calibrate(
     >>> round(nmm.calibrate(robot, log).numbers["radius.left_wheel_joint"].after, 4)
     0.103
     """
+    expect_kind(robot, Robot, "calibrate", "a Robot, as nmm.load gives it")
     where = f"calibrate {robot.name}"
-    told = [logs] if isinstance(logs, DriveLog) else [*logs]
+    several: list[Any] = [*logs] if isinstance(logs, Sequence) else [logs]
+    if several and all(isinstance(log, Sightings) for log in several):
+        return calibrate_arm(robot, several, hold, ratios, progress)
+    told: list[DriveLog] = several
     if not told or not all(isinstance(log, DriveLog) for log in told):
-        raise InputError(where=f"{where}: logs", expected="one nmm.DriveLog or several", got=logs)
+        expected = "one nmm.DriveLog or several, or one nmm.Sightings or several"
+        raise InputError(where=f"{where}: logs", expected=expected, got=logs)
+    expect(not ratios, f"{where}: ratios", "none: they are of an arm's sightings", ratios)
     if robot.platform.n_p < 3:
         raise InputError(where=where, expected="a platform that moves", got=robot.platform.name)
+    asked = asked_to_hold(hold, where)
+    check_logs(told, where)
     tell = progress or (lambda _: None)
     counters = counters_of(robot, told)
     drives = [drive_of(robot, log, counters) for log in told]
-    delays = _delays(counters, drives, hold)
-    delay = float(np.median(delays)) if delays else 0.0
-    drives = [used_looks(drive, delay) for drive in drives]
-    model = Model(robot, counters, drives, delay)
+    if sum(not drive.ends for drive in drives) > 1:
+        drives = [replace(drive, number=str(i)) for i, drive in enumerate(drives, 1)]
+    held = held_numbers(Model(robot, counters, drives), asked, where)
     for drive in drives:
-        _check_alike(model, drive, delay, where)
-    held = _held(model, hold, where)
+        check_mixed_up(robot, counters, drive, asked)
+    delays = [held_delay(asked, drive) for drive in drives]
+    drives = [
+        used_looks(drive, first_delay(counters, drive) if delay is None else delay)
+        for drive, delay in zip(drives, delays, strict=True)
+    ]
+    model = Model(robot, counters, drives)
+    for drive in drives:
+        check_alike(model, drive, where)
     steps = iter(np.linspace(0.05, 0.75, 12).tolist())
     fitted = fit(model, held, lambda _: tell(next(steps, 0.75)))
-    _check_numbers(model, fitted, where)
+    for check in (check_ends, check_numbers, check_mounting):
+        check(model, fitted, where)
+    model.forget()
     tell(0.8)
     predicted = held_out(model, fitted)
     tell(0.95)
     white = whiteness(fitted.filtered)
-    findings = [*of_drives(model, delays, held), *of_numbers(model, fitted)]
+    findings = [*of_drives(model, held), *of_numbers(model, fitted)]
     findings += of_rest(model, fitted, predicted, white)
     tell(1.0)
     return Calibration(
@@ -228,75 +252,6 @@ def calibrate(
         model=model,
         fit=fitted,
     )
-
-
-def _held(model: Model, hold: Mapping[str, float | None] | Collection[str], where: str) -> dict[int, float]:
-    known = {number.name: i for i, number in enumerate(model.learned)}
-    if isinstance(hold, str):
-        hold = (hold,)
-    held = {}
-    for name in hold:
-        expect_known("number", name, known, f"{where}: hold")
-        i = known[name]
-        value = 0.0 if name == DELAY else float(model.first[i])
-        if isinstance(hold, Mapping) and (asked := hold[name]) is not None:
-            value = scalar(asked, f"{where}: hold {name}")
-        held[i] = value
-    return held
-
-
-def _delays(
-    counters: Counters, drives: Sequence[RobotDrive], hold: Mapping[str, float | None] | Collection[str]
-) -> list[float]:
-    """The clock's delay in each drive with looks, s, as it seems at first, or as it is held."""
-    looked = [drive for drive in drives if not drive.ends]
-    if DELAY in hold:
-        held = hold[DELAY] if isinstance(hold, Mapping) else None
-        return [0.0 if held is None else scalar(held, f"{counters.where}: hold {DELAY}")] * len(looked)
-    return [first_delay(counters, drive) for drive in looked]
-
-
-def _check_alike(model: Model, drive: RobotDrive, delay: float, where: str) -> None:
-    """`InputError` where the reference goes much farther, or less, than the wheels. Steps are as long as it
-    takes for noise not to lengthen them."""
-    if drive.ends:
-        return
-    noise = float(np.median(np.hypot(*np.diff(drive.z[:, :2], 2, axis=0).T))) if len(drive.z) > 4 else 0.0
-    ways = path(model.counters, drive, drive.at - delay)
-    every = 1
-    while every < len(drive.z) // 4:
-        steps = np.hypot(*(drive.z[every:, :2] - drive.z[:-every, :2]).T)
-        if np.median(steps) > 5.0 * noise:
-            break
-        every *= 2
-    else:
-        return
-    went, turned = (ways[every:] - ways[:-every]).T
-    moving = (went > 0.2 * went.max()) & (turned < 1.0) & (went > turned)  # a point beside goes farther
-    if not np.any(moving):
-        return
-    share = float(np.median(steps[moving] / went[moving]))
-    if not LEAST_SHARE < share < MOST_SHARE:
-        what = f"the reference goes {share:.3g} m for each m by the wheels"
-        expected = "about one: wheels in rad, with radii in m; the reference in m, of this drive"
-        raise InputError(what, where=f"{where}: {drive.name}", expected=expected)
-
-
-def _check_numbers(model: Model, fitted: Fit, where: str) -> None:
-    if fitted.noise.counters > LOOSEST:
-        what = f"wheels and reference disagree by {fitted.noise.counters:.2g} rad for a rad that wheels turn"
-        expected = "wheels by their names, in rad, with their signs; a reference of this drive"
-        raise InputError(what, where=where, expected=expected)
-    for i in fitted.free:
-        number, value = model.learned[i], float(fitted.values[i])
-        if number.kind in ("radius", "scale", "track", "wheelbase", "ratio"):
-            share = value / number.value
-            if not LEAST_SHARE < share < MOST_SHARE:
-                what = (
-                    f"{number.name} would be {value:.4g} {number.unit} where the file has {number.value:.4g}"
-                )
-                expected = "a reading in its unit, with its sign"
-                raise InputError(what, where=where, expected=expected)
 
 
 def _numbers(model: Model, fitted: Fit, held: Mapping[int, float]) -> dict[str, LearnedNumber]:

@@ -13,14 +13,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from nmm.base.errors import InputError, expect
+from nmm.base.text_format import counted
 from nmm.cli.groups import Figures, Loading, command
 from nmm.cli.interrupts import shielded
 from nmm.cli.options import ARGUMENT, ROBOT_HELP, arguments_of, flag, names_of, option, out_option
 from nmm.cli.output import FAILED, OK, progress, show_table, show_text, warn
+from nmm.plugins.robot.calibration.arm.cli import SightingOptions, one_each
 from nmm.plugins.robot.cli import LogOptions
 
 if TYPE_CHECKING:
     from nmm.model.robots.robot import Robot
+    from nmm.plugins.robot.calibration.arm.calibration import ArmCalibration
     from nmm.plugins.robot.calibration.calibration import Calibration
     from nmm.plugins.robot.calibration.drive_log import DriveLog
     from nmm.plugins.robot.calibration.patch import DescriptionPatch
@@ -38,7 +41,8 @@ class TableOptions:
     units: str | None = option(
         "GROUP=UNIT,...|SI",
         "Units of a table, which are never guessed: wheels=ticks:2048 (rad, deg, rev, m:RADIUS, rpm, rad/s), "
-        "steering=deg, position=mm, heading=deg, time=ms, reference_time=s, or of one column by its name; "
+        "steering=deg, position=mm, heading=deg, time=ms, reference_time=s, of an arm joints=deg, "
+        "slides=m, or of one column by its name; "
         "SI is s, m and rad throughout.",
         show="asked for",
     )
@@ -74,7 +78,7 @@ def calibrate(
         list[str],
         typer.Argument(
             metavar="LOG...",
-            help="Drives: tables (CSV), rosbag2 folders, .mcap, .db3 or .bag files.",
+            help="Drives: tables (CSV), rosbag2 folders, .mcap, .db3 or .bag files. Sightings: tables.",
             show_default=False,
         ),
     ],
@@ -94,6 +98,7 @@ def calibrate(
         "Counters that begin anew, after a turn or after COUNT of the column's unit, or do not.",
         show="found, with a warning",
     ),
+    of_arm: SightingOptions,
     of_tables: TableOptions,
     of_bags: LogOptions,
     loading: Loading,
@@ -101,20 +106,23 @@ def calibrate(
     drawn: Figures,
     as_json: bool = flag("--json", "What was found as JSON on standard output, for scripts."),
 ) -> int:
-    """Learn a robot's own numbers from drives: wheels, track, steering.
+    """Learn a robot's own numbers: wheels, track and steering from drives, an arm's from sightings.
 
     Encoders beside a reference (a localisation, motion capture, a tracker, marks on the floor) say how large
     wheels are, how far apart, how steering stands, where the reference sits and how late it is; what the
-    drives do not show stays, and is named with the motion that would show it: docs/calibration.md.
+    drives do not show stays, and is named with the motion that would show it: docs/calibration.md. With
+    --seen-on, points of a tracker, poses of motion capture or corners in a camera say how an arm's joints are
+    read and placed, and where the camera is.
 
     \b
     nmm calibrate my_robot.urdf drive.csv --units wheels=rad,time=s,position=m,heading=rad
     nmm calibrate my_robot.urdf a.csv b.csv --reference a_mocap.csv --reference b_mocap.csv --units SI
     nmm calibrate my_robot.urdf drive.mcap --reference /mocap/pose --hold track
     nmm calibrate my_robot.urdf left.csv right.csv --reference closed --units wheels=ticks:2048,time=ms
+    nmm calibrate my_robot.urdf touched.csv --seen-on tool0 --units joints=deg,position=mm
 
     Writes calibration.yaml, which nmm.load(..., calibration=) and --calibration take, a summary, figures and,
-    of a URDF, the corrected file. Exit status 1 where a part of the drives that was not learned from is
+    of a URDF, the corrected file. Exit status 1 where a part of the logs that was not learned from is
     followed worse than before.
     """
     from nmm.model.robots.loading import load
@@ -127,37 +135,52 @@ def calibrate(
     loaded = load(robot, arguments=texts, **whole)
     folder = out or Path("runs") / f"{loaded.name}-calibration"
     check_folder(folder, report.is_calibration)
-    read = [
-        _log(file, seen, loaded, of_tables, of_bags, _wrapped(wrapped))
-        for file, seen in zip(logs, _references(reference, logs), strict=True)
-    ]
-    _expect_used(logs, of_tables, of_bags)
     held = _held(hold)
-    with progress(f"{loaded.name}, {len(read)} drive{'s' * (len(read) > 1)}") as tell:
-        found = learn(loaded, read, held, tell)
-    whole.pop("calibration", None)
-    patch, why = report.patch_of(found, **whole)
-    with shielded():
-        report.save(found, folder, patch=patch, figures=figures)
-    if as_json:
-        print(json.dumps(report.summary(found, patch) | {"folder": str(folder)}, indent=1), flush=True)
+    result: Calibration | ArmCalibration
+    if of_arm.asked:
+        _expect_none({"--reference": reference, "--wrapped": wrapped, **of_bags.keywords()})
+        try:
+            postures = of_arm.read(logs, loaded, of_tables.keywords())
+        except InputError as error:
+            where = re.sub(r": (on|by)\b", r": --seen-\1", error.where)
+            raise error.placed(where, expected=_as_options(error.expected)) from None
+        with progress(f"{loaded.name}, {counted(sum(map(len, postures)), 'posture')}") as tell:
+            result, read = of_arm.learn(loaded, postures, held, tell), []
     else:
-        _show(found, folder, patch, why, report.umbmark_rows(loaded, read))
-    return FAILED if found.held_out is not None and found.held_out.verdict == "worse" else OK
+        read = [
+            _log(file, seen, loaded, of_tables, of_bags, _wrapped(wrapped))
+            for file, seen in zip(logs, one_each(reference, logs, "--reference"), strict=True)
+        ]
+        _expect_used(logs, of_tables, of_bags)
+        with progress(f"{loaded.name}, {counted(len(read), 'drive')}") as tell:
+            result = learn(loaded, read, held, tell)
+    whole.pop("calibration", None)
+    patch, why = report.patch_of(result, **whole)
+    with shielded():
+        report.save(result, folder, patch=patch, figures=figures)
+    if as_json:
+        print(json.dumps(report.summary(result, patch) | {"folder": str(folder)}, indent=1), flush=True)
+    else:
+        _show(result, folder, patch, why, report.umbmark_rows(loaded, read))
+    return FAILED if result.held_out is not None and result.held_out.verdict == "worse" else OK
 
 
 def _show(
-    found: Calibration, folder: Path, patch: DescriptionPatch | None, why: str, more: list[list[str]]
+    result: Calibration | ArmCalibration,
+    folder: Path,
+    patch: DescriptionPatch | None,
+    why: str,
+    more: list[list[str]],
 ) -> None:
     from nmm.plugins.robot.calibration import report
 
-    for finding in found.findings:
+    for finding in result.findings:
         warn(str(finding))
     columns = ["number", "before", "after", "±", "unit", ""]
-    title = f"{found.robot.name} by {', '.join(found.logs)}"
-    show_table(columns, report.number_rows(found), title=title, numeric=columns[1:4])
+    title = f"{result.robot.name} by {', '.join(result.logs)}"
+    show_table(columns, report.number_rows(result), title=title, numeric=columns[1:4])
     show_text()
-    rows = [*report.rest_rows(found), *more, ["files in", str(folder)]]
+    rows = [*report.rest_rows(result), *more, ["files in", str(folder)]]
     said = str(patch).splitlines() if patch is not None else [why]
     rows += [["in the robot's file" if not i else "", line] for i, line in enumerate(said)]
     show_table(["", ""], rows)
@@ -208,22 +231,21 @@ def _log(
 def _as_options(expected: str) -> str:
     """What a function's parameter should have been, as options: "--units wheels=rad"."""
 
-    def told(found: re.Match[str]) -> str:
-        pairs = found["pairs"].replace("'", "").replace(": ", "=").replace(", ", ",")
-        return f"--{found['name']} {pairs}".replace("=True", "").replace("=False", "=no")
+    def told(result: re.Match[str]) -> str:
+        pairs = result["pairs"].replace("'", "").replace(": ", "=").replace(", ", ",")
+        return f"--{result['name']} {pairs}".replace("=True", "").replace("=False", "=no")
 
     text = re.sub(r"\b(?P<name>units|columns|wrapped)=\{(?P<pairs>[^}]*)\}", told, expected)
     text = text.replace("ends='closed'", "--reference closed")
     return re.sub(r"\b(reference|map|odom|odometry|wrapped)=(?=[ ,;]|$)", r"--\1", text)
 
 
-def _references(asked: Sequence[str] | None, logs: Sequence[str]) -> list[str | None]:
-    """The reference of each log."""
-    given = [*(asked or [])]
-    if len(given) in (0, 1):
-        return [given[0] if given else None] * len(logs)
-    expect(len(given) == len(logs), "--reference", f"one, or one for each of {len(logs)} logs", len(given))
-    return [*given]
+def _expect_none(given: dict[str, Any]) -> None:
+    """`InputError` for an option that is of drives."""
+    for name, value in given.items():
+        if value is not None:
+            where = name if name.startswith("--") else f"--{name}"
+            raise InputError("it is of drives, and --seen-on of an arm", where=where)
 
 
 def _expect_used(logs: Sequence[str], of_tables: TableOptions, of_bags: LogOptions) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 
 import numpy as np
 
@@ -13,9 +13,8 @@ from nmm.plugins.robot.calibration.judged import CHANCE, HeldOut
 from nmm.plugins.robot.calibration.model import Model
 from nmm.plugins.robot.calibration.parameters import CLOCK
 
-#: Delays of drives that differ by more, s, are told; a number that is so many times as far from the file's as
-#: is plausible.
-UNEVEN, FAR = 0.1, 2.0
+#: A number that is so many times as far from the file's as is plausible.
+FAR = 2.0
 #: A clock that runs apart by less over the drive, s, is none that does.
 APART = 0.005
 
@@ -48,14 +47,15 @@ def of_numbers(model: Model, fitted: Fit) -> list[Finding]:
     ]
 
 
-def of_drives(model: Model, delays: Sequence[float], held: Collection[int]) -> list[Finding]:
+def of_drives(model: Model, held: Collection[int]) -> list[Finding]:
     lengths = [i for i, number in enumerate(model.learned) if number.unit == "m"]
     findings = [Finding("scale_held")] if model.closed and not any(i in held for i in lengths) else []
-    if delays and max(delays) - min(delays) > UNEVEN:
-        findings.append(Finding("delays_differ", {"least": min(delays), "most": max(delays)}))
     for drive in model.drives:
         if drive.gaps:
             findings.append(Finding("counters_silent", {"log": drive.name, "count": drive.gaps}))
+        if drive.twist:
+            values = {"log": drive.name, "by": drive.twist}
+            findings.append(Finding("reference_twisted", values, {"t": float(drive.at[0])}))
         if drive.every > 1:
             values = {"log": drive.name, "every": drive.every, "count": len(drive.at)}
             findings.append(Finding("looks_thinned", values))
@@ -79,11 +79,17 @@ def of_rest(model: Model, fitted: Fit, predicted: HeldOut | None, white: float) 
     elif predicted.verdict != "better":
         values = predicted._asdict() | {"verdict": predicted.verdict}
         findings.append(Finding("not_better", values))
-    clock = model.index(CLOCK)
-    if clock in fitted.free:
-        rate = float(fitted.values[clock])
-        apart = abs(rate) * max(float(drive.at[-1] - drive.at[0]) for drive in model.drives)
-        if abs(rate) > 4.0 * fitted.deviations[fitted.free.index(clock)] and apart > APART:
-            values = {"rate": abs(rate) * 6e4, "faster": rate > 0.0, "apart": 1e3 * apart}
-            findings.append(Finding("clocks_apart", values))
+    for drive in model.with_looks:
+        clock = model.index(f"{CLOCK}.{drive.number}" if drive.number else CLOCK)
+        if clock in fitted.free:
+            rate = float(fitted.values[clock])
+            apart = abs(rate) * float(drive.at[-1] - drive.at[0])
+            if abs(rate) > 4.0 * fitted.deviations[fitted.free.index(clock)] and apart > APART:
+                values = {
+                    "log": drive.name,
+                    "rate": abs(rate) * 6e4,
+                    "faster": rate > 0.0,
+                    "apart": 1e3 * apart,
+                }
+                findings.append(Finding("clocks_apart", values))
     return findings

@@ -45,6 +45,9 @@ class RobotDrive:
     middle : the time by the reference's clock, s, from which a clock that runs otherwise is counted
     every : of how many looks of the log about one is taken
     gaps : how many times encoders said nothing for long
+    twist : by how much a reference is turned whose headings are not used for that, rad
+    number : of several drives with looks, which, from 1 on, as its clock's numbers are named; else ""
+    delay : how late its reference's clock is at first, s
     """
 
     name: str
@@ -60,6 +63,9 @@ class RobotDrive:
     middle: float = 0.0
     every: int = 1
     gaps: int = 0
+    twist: float = 0.0
+    number: str = ""
+    delay: float = 0.0
 
     def within(self, first: float, last: float) -> RobotDrive:
         """The looks between two shares of all, from one that is taken on."""
@@ -176,7 +182,7 @@ def _check_moved(counters: Counters, drive: RobotDrive) -> None:
 def on_grid(counters: Counters, drive: RobotDrive) -> tuple[Array, Stretches]:
     """Times over a whole drive, evenly apart, and the stretches between them."""
     grid = np.linspace(drive.t[0], drive.t[-1], min(len(drive.t), 4 * ENOUGH))
-    return grid, stretches(counters.record, drive.t, drive.counts, drive.own, grid)
+    return grid, stretches(counters.record, drive.t, drive.counts, drive.own, grid, whole=False, sides=False)
 
 
 def path(counters: Counters, drive: RobotDrive, at: Array) -> Array:
@@ -210,7 +216,7 @@ def first_delay(counters: Counters, drive: RobotDrive) -> float:
                 continue
             went = np.diff(np.interp(times, grid, ways[:, i]))[inside]
             off = np.abs(seen[inside, i] - went)
-            usual = np.median(np.abs(went)) + 1e-9
+            usual = np.median(went) + np.median(seen[inside, i]) + 1e-9  # on the spot wheels go nowhere
             costs[k] += np.minimum(off, 3.0 * np.median(off) + 1e-12).mean() / usual
     known = np.isfinite(costs)
     if not np.any(known):
@@ -247,4 +253,4 @@ def used_looks(drive: RobotDrive, delay: float) -> RobotDrive:
         raise InputError(what, where=drive.name, got=f"{np.count_nonzero(inside)} of {len(drive.at)}")
     taken = taken[inside]
     taken[0] = BEGINS
-    return replace(drive, at=drive.at[inside], z=drive.z[inside], taken=taken, gaps=len(gaps))
+    return replace(drive, at=drive.at[inside], z=drive.z[inside], taken=taken, gaps=len(gaps), delay=delay)

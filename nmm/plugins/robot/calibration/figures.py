@@ -19,6 +19,7 @@ from nmm.plugins.robot.calibration.ways import bounds_of, ways_beside
 from nmm.views.figures import style
 
 if TYPE_CHECKING:
+    from nmm.plugins.robot.calibration.arm.calibration import ArmCalibration
     from nmm.plugins.robot.calibration.calibration import Calibration
     from nmm.plugins.robot.calibration.drives import RobotDrive
 
@@ -41,12 +42,12 @@ _LOOK: dict[int, dict[str, Any]] = {
 }
 
 
-def path(found: Calibration, *, width: float = style.PAGE) -> Figure:
+def path(result: Calibration, *, width: float = style.PAGE) -> Figure:
     """From above, for each drive (four at most): what the reference saw, and the way of its place on the
     robot by the wheels alone, with the numbers before and after, from where the drive was seen to begin."""
-    drives, more = _shown(found)
+    drives, more = _shown(result)
     names = ["the reference", "wheels, before", "wheels, after", "begin"]
-    pieces = [ways_beside(found, k) for k in range(len(drives))]
+    pieces = [ways_beside(result, k) for k in range(len(drives))]
     bounds = [bounds_of([way for piece in several for way in piece]) for several in pieces]
     across = width - style.LEFT - style.RIGHT
     heights = [min(PATHS, across * (high[1] - low[1]) / (high[0] - low[0])) for low, high in bounds]
@@ -69,7 +70,7 @@ def path(found: Calibration, *, width: float = style.PAGE) -> Figure:
             axes.plot(*before.T, "--", color=VERMILLION, linewidth=1.1, label=None if i else names[1])
             axes.plot(*after.T, "-", color=BLUE, linewidth=1.1, label=None if i else names[2])
             axes.plot(
-                *seen[0], "o", color=GREEN, markersize=5.0, markeredgecolor="white", zorder=6,
+                *seen[0], "o", color=GREEN, markersize=5.0, markeredgewidth=0.0, zorder=6,
                 label=None if i else names[3], linestyle="none",
             )  # fmt: skip
         low, high = bounds[k]
@@ -84,10 +85,10 @@ def path(found: Calibration, *, width: float = style.PAGE) -> Figure:
     return style.aligned(made)
 
 
-def residuals(found: Calibration, *, width: float = style.PAGE) -> Figure:
+def residuals(result: Calibration, *, width: float = style.PAGE) -> Figure:
     """Over time, for each drive (four at most): what the filter did not predict of each look of the
     reference, along the robot's axes, over its standard deviation; what was left out, and jumps."""
-    shown = _looks(found)
+    shown = _looks(result)
     panels = [(one, row) for one in shown for row in range(one.w.shape[1])]
     across = width - style.LEFT - style.RIGHT
     legend = style.room(style.legend_rows([*_LOOKS.values()], across))
@@ -114,9 +115,9 @@ def residuals(found: Calibration, *, width: float = style.PAGE) -> Figure:
     return style.aligned(made)
 
 
-def correlation(found: Calibration, *, width: float = style.PAGE) -> Figure:
+def correlation(result: Calibration | ArmCalibration, *, width: float = style.PAGE) -> Figure:
     """Correlation of the numbers that were learned: near 1 or -1 where the drives tell two hardly apart."""
-    names = found.learned
+    names = result.learned
     n = max(len(names), 1)
     labels = [f"{_short(name)}  {i + 1}" for i, name in enumerate(names)]
     left = 0.25 + 0.062 * max((len(text) for text in labels), default=0)
@@ -127,8 +128,8 @@ def correlation(found: Calibration, *, width: float = style.PAGE) -> Figure:
         style.note(axes, "nothing was learned")
         axes.xaxis.set_major_locator(NullLocator())
         return made
-    deviations = np.sqrt(np.diag(found.covariance))
-    matrix = found.covariance / np.outer(deviations, deviations)
+    deviations = np.sqrt(np.diag(result.covariance))
+    matrix = result.covariance / np.outer(deviations, deviations)
     colors = LinearSegmentedColormap.from_list("correlation", [VERMILLION, "#FFFFFF", BLUE])
     axes.imshow(matrix, cmap=colors, vmin=-1.0, vmax=1.0, extent=(-0.5, n - 0.5, n - 0.5, -0.5))
     size = min(style.SMALL, 72.0 * cell / 3.1)
@@ -154,9 +155,20 @@ FIGURES: dict[str, Callable[..., Figure]] = {
 }
 
 
-def _shown(found: Calibration) -> tuple[Sequence[RobotDrive], str]:
+def figures_of(result: Calibration | ArmCalibration) -> dict[str, Callable[..., Figure]]:
+    """The figures of a calibration, by the names of their files."""
+    from nmm.plugins.robot.calibration.arm.calibration import ArmCalibration
+
+    if not isinstance(result, ArmCalibration):
+        return FIGURES
+    from nmm.plugins.robot.calibration.arm.figures import sightings
+
+    return {"residuals": sightings, "correlation": correlation}
+
+
+def _shown(result: Calibration) -> tuple[Sequence[RobotDrive], str]:
     """The drives that have panels, and how many more there are, in words."""
-    drives = found.model.drives
+    drives = result.model.drives
     return drives[:MOST], f"and {counted(len(drives) - MOST, 'drive')} more" if len(drives) > MOST else ""
 
 
@@ -190,15 +202,15 @@ class _Looks(NamedTuple):
     w: Array
 
 
-def _looks(found: Calibration) -> list[_Looks]:
+def _looks(result: Calibration) -> list[_Looks]:
     """Those of each drive; of drives of which only the ends are known one for each drive, together."""
-    drives, filtered = found.model.drives, found.fit.filtered
+    drives, filtered = result.model.drives, result.fit.filtered
     if all(drive.ends for drive in drives):
         rows = min(drive.rows for drive in drives)
         w = np.stack([one.w[-1, :rows] for one in filtered])
         taken = np.array([drive.taken[-1] for drive in drives])
         return [_Looks("where drives end", "", "drive", np.arange(1.0, len(w) + 1.0), taken, w)]
-    shown, more = _shown(found)
+    shown, more = _shown(result)
     last, axis = len(shown) - 1, "time t by the reference's clock [s]"
     return [
         _Looks(drive.name, more if k == last else "", axis, drive.at[1:], drive.taken[1:], filtered[k].w[1:])

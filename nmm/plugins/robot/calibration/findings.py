@@ -11,19 +11,19 @@ WORDS: dict[str, Words] = {
     "ticks a turn?",
     "of_the_log": "{names:and} {names:plural is|are} of the log's own counts, no numbers of the robot: an "
     "odometry takes them as slip=",
-    "delays_differ": "the reference's clock is {least:.2g} to {most:.2g} s behind in these drives, and one "
-    "delay is learned: calibrate by each of them",
     "counters_silent": "{log}: the encoders said nothing for long {count:count time}: begun anew after it",
     "looks_left_out": "{log}: {count:count look} of {all} of the reference left out, which no noise "
     "explains, first at {t:.4g} s",
     "reference_jumped": "{log}: the reference jumped {count:count time}, first at {t:.4g} s: begun anew "
     "there",
+    "reference_twisted": "{log}: the reference's heading jumped, {by:.2g} rad beside the rest, and its "
+    "place did not: its headings are not used there",
     "looks_thinned": "{log}: one of {every} looks of the reference is used, {count} in all",
     "not_white": "what is left is no white noise (p = {p:.2g}): more is wrong than these numbers, or other "
     "noise than of wheels and reference; deviations are too small then",
     "not_better": "over {windows} windows of {length:.2g} m that were not learned from, dead reckoning by "
     "the new numbers: {verdict} ({after:.3g} m off after {before:.3g} m, p = {p:.2g})",
     "no_held_out": "the drives are too short for a part of them to be held out",
-    "clocks_apart": "the reference's clock runs {rate:.3g} ms a minute "
+    "clocks_apart": "{log}: the reference's clock runs {rate:.3g} ms a minute "
     "{faster:if faster}{faster:else slower} than the encoders': {apart:.3g} ms over the drive",
 }

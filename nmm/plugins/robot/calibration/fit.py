@@ -13,9 +13,10 @@ from scipy.optimize import minimize
 
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError
-from nmm.plugins.robot.calibration.innovations import BEGINS, LEFT_OUT, TAKEN
+from nmm.plugins.robot.calibration import shown
 from nmm.plugins.robot.calibration.model import DriveNoise, Filtered, Model
 from nmm.plugins.robot.calibration.parameters import CLOCK, DELAY
+from nmm.plugins.robot.calibration.screening import SCREENS, begin_again, plain_jumps, rejoin, screened
 
 #: What is taken for noise at first, and the range in which it is sought.
 FIRST = DriveNoise(
@@ -43,19 +44,19 @@ OF_ENDS = {"place": 0.002, "heading": 0.005, "across": 1e-4, "turns": 1e-4}
 MOST = DriveNoise(
     place=3.0, heading=1.0, counters=1.0, across=1.0, turns=1.0, agreement=1.0, following=1.0, jitter=0.2
 )
-#: A direction of numbers is shown if it is known to this share of what is plausible.
-SHOWN = 0.5
 #: While outliers are sought, numbers stay about within so many times what is plausible.
 PRIOR = 1.0
-#: Innovations beyond so many standard deviations are outliers, looked for so many times.
-OUTLIER, SCREENS = 5.0, 6
-#: Looks after a bad one that tell whether the reference jumped; below so many innovations a number, noise is
-#: judged with the numbers that were learned from them (restricted likelihood).
-NEXT, FEW = 3, 100
+#: Below so many innovations a number, noise is judged with the numbers that were learned from them
+#: (restricted likelihood).
+FEW = 100
 #: Steps of least squares end when no number moves by such a share of its deviation.
 SMALL, STEPS = 0.02, 25
-#: They also end when twice the logarithm of the likelihood gains less; slopes are taken anew at the first.
-ENOUGH, ANEW = 1e-3, 2
+#: They also end when twice the logarithm of the likelihood gains less.
+ENOUGH = 1e-3
+#: A hitch's noise is no smaller a share of that of all.
+LEAST_SHARE = 0.02
+#: Rows that are factorised at once.
+ROWS = 2048
 
 
 @dataclass(eq=False)
@@ -97,13 +98,23 @@ def fit(
         for turn in range(SCREENS):  # what is shown is judged when no outliers are left
             progress(f"outliers, {turn + 1} of {SCREENS} at most")
             values = solve(model, values, sought, level, prior=PRIOR)
+            if turn == 0 and plain_jumps(model, values, level):
+                values = solve(model, values, sought, level, prior=PRIOR)
             level = noise_of(model, values, sought, level)
+            if turn == 1:
+                rejoin(model, values, level)
+            begun = model.begun
             if not screened(model, values, level) and turn > 0:
                 break
+            if model.begun > begun:
+                begin_again(model, values)
+                level = FIRST
     unseen: dict[int, list[int]] = {}
     free = sought
     for turn in range(2):
         lost = hidden(model, values, free, level)
+        if all(drive.ends for drive in model.drives):
+            lost = together(lost)
         for i in lost:
             values[i] = 0.0 if model.learned[i].kind == DELAY else model.first[i]
         unseen |= lost
@@ -121,6 +132,7 @@ def fit(
         else 1.0
     )
     covariance = np.asarray(np.linalg.pinv(W.T @ W, hermitian=True) * max(share, 1.0), dtype=np.float64)
+    filtered = [drive_fit.without_slopes() for drive_fit in filtered]
     fitted = Fit(values, free, covariance, level, filtered, unseen)
     if not scale:
         return fitted
@@ -158,32 +170,44 @@ def with_mean_radius(model: Model, fitted: Fit, scale: Sequence[int]) -> Fit:
 
 
 def stacked(filtered: Sequence[Filtered], f: int) -> tuple[Array, Array]:
-    """w (N,) and W (N, f) of the looks that were taken, and of what is known beside them."""
-    w, W = [], []
+    """w (R,) and W (R, f), R <= f + 1, of which squares and products are those of all rows: of the looks
+    that were taken, and of what is known beside them. (The triangle of a QR factorisation, by some rows.)"""
+    triangle = np.zeros((0, f + 1))
     for drive_fit in filtered:
-        w += [drive_fit.w[drive_fit.taken].ravel(), drive_fit.agreement.over, drive_fit.following.over]
-        looks = drive_fit.W[drive_fit.taken].reshape(-1, drive_fit.W.shape[2])
-        W += [rows[:, :f] for rows in (looks, drive_fit.agreement.slopes, drive_fit.following.slopes)]
-    return np.concatenate(w), np.concatenate(W)
+        looks = drive_fit.w.reshape(-1), drive_fit.W.reshape(-1, drive_fit.W.shape[2])
+        taken = np.repeat(drive_fit.taken, drive_fit.w.shape[1])
+        sides = [
+            (part.over, part.slopes, part.weights) for part in (drive_fit.agreement, drive_fit.following)
+        ]
+        for over, slopes, weights in ((*looks, taken.astype(np.float64)), *sides):
+            for first in range(0, len(over), ROWS):
+                some = slice(first, first + ROWS)
+                rows = np.column_stack([slopes[some, :f] * weights[some, np.newaxis], over[some]])
+                rows = rows[weights[some] > 0.0]
+                factors: Any = np.linalg.qr(np.concatenate([triangle, rows]), mode="r")
+                triangle = factors
+    return triangle[:, f].copy(), triangle[:, :f].copy()
 
 
-def solve(model: Model, values: Array, free: list[int], noise: DriveNoise, prior: float = 0.0) -> Array:
-    """Least squares by Gauss and Newton's steps, halved where they lead up; with a prior, numbers stay within
-    so many times what is plausible."""
+def solve(
+    model: Model, values: Array, free: list[int], noise: DriveNoise, prior: float = 0.0, steps: int = STEPS
+) -> Array:
+    """Least squares by Gauss and Newton's steps, halved where they lead up, so many at most; with a prior,
+    numbers stay within so many times what is plausible."""
     if not free:
         return values
     scales = model.scales[free]
     pull = np.diag(1.0 / (prior * scales)) if prior else np.zeros((0, len(free)))
 
-    def cost_of(at: Array, slopes: Sequence[int]) -> tuple[float, Array, Array]:
-        filtered = model.filtered(at, slopes, model.stretched(at, slopes), noise)
-        w, W = stacked(filtered, len(slopes))
+    def cost_of(at: Array) -> tuple[float, Array, Array]:
+        filtered = model.filtered(at, free, model.stretched(at, free), noise)
+        w, W = stacked(filtered, len(free))
         off = pull @ (at - model.first)[free]
         likelihood = sum(drive_fit.log_likelihood for drive_fit in filtered)
         return -2.0 * likelihood + off @ off, np.concatenate([w, off]), W
 
-    cost, w, W = cost_of(values, free)
-    for turn in range(STEPS):
+    cost, w, W = cost_of(values)
+    for _ in range(steps):
         step = -scales * np.linalg.lstsq(np.concatenate([W, pull]) * scales, w, rcond=1e-12)[0]
         step *= min(1.0, 1.0 / np.max(np.abs(step) / (3.0 * scales)))
         if float(np.sum((W @ step) ** 2)) < SMALL**2:
@@ -192,17 +216,16 @@ def solve(model: Model, values: Array, free: list[int], noise: DriveNoise, prior
             trial = values.copy()
             trial[free] += step
             with suppress(InputError):  # a length below zero
-                new, ahead, _ = cost_of(trial, ())
+                new, *ahead = cost_of(trial)
                 if new < cost:  # not so for a number that is none
                     break
             step = 0.5 * step
         else:
             break
-        values, gained, cost, w = trial, cost - new, new, ahead
+        values, gained, cost = trial, cost - new, new
+        w, W = ahead
         if gained < ENOUGH:
             break
-        if turn < ANEW or gained > 1.0:  # later slopes are as those before
-            cost, w, W = cost_of(values, free)
     return values
 
 
@@ -212,13 +235,12 @@ def noise_of(model: Model, values: Array, free: Sequence[int], first: DriveNoise
     likelihood approaches to variance component estimation, JASA 72, 1977)."""
     made = model.stretched(values, [])
     as_before = model.filtered(values, [], made, first)
-    for name in ("agreement", "following"):
-        beside = [getattr(drive_fit, name) for drive_fit in as_before]
-        if count := sum(drive_fit.free for drive_fit in beside):
-            square = sum(float(drive_fit.over @ drive_fit.over) for drive_fit in beside)
-            level = getattr(first, name) * math.sqrt(square / count)
-            level = min(max(level, getattr(LEAST, name)), getattr(MOST, name))
-            first = first._replace(**{name: level})
+    beside = [drive_fit.agreement for drive_fit in as_before]
+    if count := sum(part.free for part in beside):
+        square = sum(float(part.over @ part.over) for part in beside)
+        level = first.agreement * math.sqrt(square / count)
+        first = first._replace(agreement=min(max(level, LEAST.agreement), MOST.agreement))
+    first = _of_hitches(model, as_before, first)
     looked = model.with_looks
     sought = ["counters", *(["place", "across", "turns", "jitter"] if looked else [])]
     if any(drive.rows == 3 for drive in looked):
@@ -253,68 +275,44 @@ def noise_of(model: Model, values: Array, free: Sequence[int], first: DriveNoise
     return noise_at(fitted.x)
 
 
+def _of_hitches(model: Model, filtered: Sequence[Filtered], first: DriveNoise) -> DriveNoise:
+    """With the noise of how hitches follow; each hitch's share of it is kept by the model: the first is
+    turned by what wheels slip, the next ones by less."""
+    squares, counts = np.zeros(len(model.hitch_shares)), np.zeros(len(model.hitch_shares))
+    for drive, drive_fit in zip(model.drives, filtered, strict=True):
+        if drive.hitches:
+            over = drive_fit.following.over.reshape(-1, len(drive.hitches))
+            squares[drive.hitches] += np.sum((over * model.hitch_shares[drive.hitches]) ** 2, axis=0)
+            counts[drive.hitches] += len(over)
+    if not squares.any():
+        return first
+    mean, known = math.sqrt(squares.sum() / counts.sum()), counts > 0.0
+    shares = np.sqrt(squares[known] / counts[known]) / mean
+    model.hitch_shares[known] = np.maximum(shares, LEAST_SHARE)
+    level = first.following * mean
+    return first._replace(following=min(max(level, LEAST.following), MOST.following))
+
+
 def hidden(model: Model, values: Array, free: Sequence[int], noise: DriveNoise) -> dict[int, list[int]]:
-    """Numbers that the drives do not show, one after another: of what is plausible, the direction that is
-    least known, in units of the noise; the last number in it by order of what is held first."""
+    """Numbers that the drives do not show (`shown.hidden`)."""
     filtered = model.filtered(values, free, model.stretched(values, free), noise)
     _, W = stacked(filtered, len(free))
-    left, lost = [*range(len(free))], {}
-    while left:
-        scaled = W[:, left] * model.scales[[free[j] for j in left]]
-        _, sizes, directions = np.linalg.svd(scaled, full_matrices=False)
-        if len(sizes) == len(left) and sizes[-1] * SHOWN > 1.0:
-            break
-        weak = np.abs(directions[-1])
-        weak = np.where(weak > 0.3 * weak.max(), weak, 0.0)
-        order = [_held_first(model.learned[free[j]].kind) for j in left]
-        worst = max(range(len(left)), key=lambda j: (weak[j] > 0.0, order[j], weak[j]))
-        others = [free[left[j]] for j in range(len(left)) if weak[j] > 0.0 and j != worst]
-        lost[free[left.pop(worst)]] = others
-    return lost
+    kinds = [model.learned[i].kind for i in free]
+    lost = shown.hidden(W, model.scales[[*free]], lambda j: _held_first(kinds[j]))
+    return {free[j]: [free[i] for i in others] for j, others in lost.items()}
+
+
+def together(lost: Mapping[int, list[int]]) -> dict[int, list[int]]:
+    """The numbers that drives do not show, with those that they show only where others are exact: of ends
+    alone nothing else tells these."""
+    made = dict(lost)
+    for i, others in lost.items():
+        for j in others:
+            made.setdefault(j, [i, *(other for other in others if other != j)])
+    return made
 
 
 def _held_first(kind: str) -> int:
     """Of numbers that are not told apart, those that are held rather than others."""
     order = ["radius", "scale", "offset", "track", "wheelbase", "left", "right"]
     return order.index(kind) if kind in order else len(order) + (kind in ("ratio", "reference", DELAY, CLOCK))
-
-
-def screened(model: Model, values: Array, noise: DriveNoise) -> int:
-    """Leave out looks that no noise explains, and begin anew where the reference jumped; how many are new.
-
-    A look that is far off, and those after it, are left out for a trial: if what comes then is where it was
-    predicted, the far ones were outliers; else the reference jumped."""
-    changes, made = 0, model.stretched(values, [])
-
-    def far_off(i: int) -> Array:
-        drive = model.drives[i]
-        drive_fit = model.of([drive]).filtered(values, [], [made[i]], noise)[0]
-        return np.max(np.abs(drive_fit.w), axis=1)
-
-    for i, drive in enumerate(model.drives):
-        for _ in range(0 if drive.ends else SCREENS):
-            bad = np.flatnonzero((drive.taken == TAKEN) & (far_off(i) > OUTLIER)).tolist()
-            bad = [m for n, m in enumerate(bad) if n == 0 or m - bad[n - 1] > 1]  # a run's first
-            apart: list[int] = []
-            for m in bad:
-                if not apart or m - apart[-1] > 3 * NEXT:
-                    apart.append(m)
-            if not apart:
-                break
-            before = drive.taken.copy()
-            for m in apart:
-                drive.taken[m : m + NEXT][before[m : m + NEXT] == TAKEN] = LEFT_OUT
-            off = far_off(i)
-            for m in apart:
-                drive.taken[m : m + NEXT] = before[m : m + NEXT]
-                later = [n for n in range(m + NEXT, min(m + 2 * NEXT, len(off))) if before[n] == TAKEN]
-                if later and all(off[n] > OUTLIER for n in later):
-                    drive.taken[m] = BEGINS
-                else:
-                    some = np.arange(m, min(m + NEXT, len(off)))
-                    drive.taken[some[(before[some] == TAKEN) & (off[some] > OUTLIER)]] = LEFT_OUT
-            new = int(np.count_nonzero(drive.taken != before))
-            changes += new
-            if not new:
-                break
-    return changes

@@ -71,6 +71,7 @@ def innovations(
     motions: Array,
     slopes: Array,
     noise: Array,
+    variances: Array,
     z: Array,
     taken: Integers,
     R: Array,
@@ -84,7 +85,8 @@ def innovations(
     """w (M, r), divided by their standard deviations, and W (M, r, n), their slopes; S (M, r) : variances
     before this; zeros, zeros and ones where nothing is predicted; poses (M, 3) : believed after each look.
 
-    motions (M - 1, 3), slopes (M - 1, 3, n), noise (M - 1, 3, 3) : of the stretches
+    motions (M - 1, 3), slopes (M - 1, 3, n) : of the stretches
+    noise (M - 1, K, 3, 3) : of the stretches, for variances of one; variances (K,) : of each kind of noise
     z (M, 3) : x, y, heading, of which r = 2 or 3 were seen; with 2 the heading is a guess where a drive
     begins taken (M,) : LEFT_OUT, whose innovations are told but not taken, TAKEN, or BEGINS
     R (M, 3) : variances of z, along the body's axes; mount (3,), columns (3,) : see `begin_at`
@@ -104,7 +106,9 @@ def innovations(
                 for j in range(n):
                     J[i, j] = slopes[m - 1, i, j]
                 for j in range(3):
-                    Q[i, j] = noise[m - 1, i, j]
+                    Q[i, j] = 0.0
+                    for kind in range(variances.shape[0]):
+                        Q[i, j] += variances[kind] * noise[m - 1, kind, i, j]
             go_on(step, J, Q, X, P, D)
         for row in range(r):
             w[m, row], S[m, row] = 0.0, 1.0
@@ -158,6 +162,6 @@ def innovations(
 _FLAT, _ROWS, _CUBE = float64[::1], float64[:, ::1], float64[:, :, ::1]
 #: The signature of `innovations`, for n >= 1.
 INNOVATIONS = void(
-    *(_ROWS, _CUBE, _CUBE, _ROWS, int64[::1], _ROWS, _FLAT, int64[::1]),
+    *(_ROWS, _CUBE, float64[:, :, :, ::1], _FLAT, _ROWS, int64[::1], _ROWS, _FLAT, int64[::1]),
     *(_ROWS, _ROWS, _CUBE, _ROWS),
 )

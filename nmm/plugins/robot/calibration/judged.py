@@ -23,8 +23,14 @@ LEARNED_FROM = 0.7
 CHANCE = 0.01
 #: Windows of dead reckoning in the part that is predicted: at most so long, m, and at least so many.
 LONGEST, WINDOWS = 5.0, 8
+#: With fewer windows nothing is said.
+SIDE = 4
 #: A turn of a rad counts as so many m in the length of a window.
 TURN = 0.5
+
+
+#: Numbers are better that leave less of the middle window's error, and less of its length.
+MOST_LEFT, NEAR = 0.9, 0.2
 
 
 class HeldOut(NamedTuple):
@@ -33,12 +39,14 @@ class HeldOut(NamedTuple):
     windows : how many, and their length, m
     before, after : root of the mean square error at their ends, m, by the file's numbers and by those learned
     heading_before, heading_after : rad; NaN without headings
+    share : the middle window's error after, of the window's length; left : of the error before, both with
+        headings, a rad for half a metre
     p : the chance that such a difference comes of noise alone (Wilcoxon's signed ranks, of the squares of
         places and headings, a rad for half a metre); closer : whether these ranks are for the numbers learned
 
     Examples
     --------
-    >>> nmm.extending.HeldOut(15, 2.2, 0.128, 0.009, 0.39, 0.013, p=6e-5, closer=True).verdict
+    >>> nmm.extending.HeldOut(15, 2.2, 0.128, 0.009, 0.39, 0.013, 0.005, 0.07, p=6e-5, closer=True).verdict
     'better'
     """
 
@@ -48,15 +56,19 @@ class HeldOut(NamedTuple):
     after: float
     heading_before: float
     heading_after: float
+    share: float
+    left: float
     p: float
     closer: bool
 
     @property
     def verdict(self) -> str:
-        """ "better", "worse" or "no difference"."""
-        if not self.p < 0.05:
+        """ "better", "worse", "no difference", or "far off" where it is nearer and yet not near."""
+        if not self.p < 0.05 or (self.closer and self.left > MOST_LEFT):
             return "no difference"
-        return "better" if self.closer else "worse"
+        if not self.closer:
+            return "worse"
+        return "better" if self.share < NEAR else "far off"
 
 
 def whiteness(filtered: Sequence[Filtered]) -> float:
@@ -103,14 +115,15 @@ def held_out(model: Model, fitted: Fit) -> HeldOut | None:
     for part, rest in parts:
         learned = fit(part, held, like=fitted)
         by_file = fit(part, held | {i: float(model.first[i]) for i in robots}, like=fitted)
-        windows, length = _windows(rest, learned)
+        windows, length = windows_of(rest, learned)
         lengths.append(length)
         for errors, which in zip(ends, (by_file, learned), strict=True):
-            errors.append(_window_ends(rest, which, windows))
+            errors.append(window_ends(rest, which, windows))
     before, after = (np.concatenate(errors) for errors in ends)
     if len(before) < WINDOWS:
         return None
-    score = [_squares(errors, 2) + TURN**2 * _squares(errors, 3, 2) for errors in (before, after)]
+    far = [off_by(errors) for errors in (before, after)]
+    score, middle = [one**2 for one in far], [float(np.median(one)) for one in far]
     same = bool(np.all(score[0] == score[1]))
     p = 1.0 if same else float(stats.wilcoxon(score[0], score[1]).pvalue)
     gained = score[0] - score[1]
@@ -119,7 +132,14 @@ def held_out(model: Model, fitted: Fit) -> HeldOut | None:
     turned, turns = (math.sqrt(_squares(errors, 3, 2).mean()) for errors in (before, after))
     if before.shape[1] == 2:
         turned = turns = math.nan
-    return HeldOut(len(before), float(np.mean(lengths)), first, last, turned, turns, p, closer)
+    length = float(np.mean(lengths))
+    left = middle[1] / max(middle[0], 1e-12)
+    return HeldOut(len(before), length, first, last, turned, turns, middle[1] / length, left, p, closer)
+
+
+def off_by(errors: Array) -> Array:
+    """How far off errors (W, 2) or (W, 3) are (W,), m, a turn counted as a length."""
+    return np.sqrt(_squares(errors, 2) + TURN**2 * _squares(errors, 3, 2))
 
 
 def _squares(errors: Array, last: int, first: int = 0) -> Array:
@@ -131,7 +151,7 @@ def _squares(errors: Array, last: int, first: int = 0) -> Array:
 Windows = list[list[tuple[int, int]]]
 
 
-def _windows(model: Model, fitted: Fit) -> tuple[Windows, float]:
+def windows_of(model: Model, fitted: Fit) -> tuple[Windows, float]:
     """Windows of dead reckoning, one after another, without looks that were left out, and their length, m."""
     if all(drive.ends for drive in model.drives):
         ways = [path(model.counters, drive, drive.t[-1:])[0, 0] for drive in model.drives]
@@ -141,6 +161,8 @@ def _windows(model: Model, fitted: Fit) -> tuple[Windows, float]:
         steps = np.hypot(made.motions[:, 0], made.motions[:, 1]) + TURN * np.abs(made.motions[:, 2])
         ways.append(np.concatenate([[0.0], np.cumsum(steps)]))
     length = min(LONGEST, sum(float(way[-1]) for way in ways) / (2.0 * WINDOWS))
+    if not length > 0.0:  # it stands still
+        return [[] for _ in model.drives], length
     windows: Windows = []
     for drive, way in zip(model.drives, ways, strict=True):
         windows.append([])
@@ -158,7 +180,7 @@ def _windows(model: Model, fitted: Fit) -> tuple[Windows, float]:
     return windows, length
 
 
-def _window_ends(model: Model, fitted: Fit, windows: Windows) -> Array:
+def window_ends(model: Model, fitted: Fit, windows: Windows) -> Array:
     """Errors (W, 3) or (W, 2) of the reference's place, along the body, at the ends of windows that begin
     where the filter believes the robot to be."""
     stretched = model.stretched(fitted.values, [])

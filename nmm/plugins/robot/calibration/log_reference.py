@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import combinations
 
 import numpy as np
 
@@ -55,9 +56,19 @@ def check_reference(
         turned, turns = np.abs(moved[:, 2]), np.abs(by[2])
         few, many = _quotient(turned, turns, turns > TURNS), _quotient(turned, turns, turned > TURNS)
         if few < 1.0 / APART or many > APART:
+            _expect_apart(measured, where)
             ratio = few if few < 1.0 / APART else many
             alone = (way > MUCH).sum() >= SOME  # then ways have shown that its counters' unit is right
             raise _apart("turn it", ratio, counter, ("headings", units[1]), where, alone)
+
+
+def _expect_apart(measured: MeasuredDrive, where: str) -> None:
+    """`InputError` where two counters are one: then nothing turns."""
+    for first, second in combinations(measured.readings, 2):
+        if np.array_equal(measured.readings[first], measured.readings[second]):
+            columns = dict.fromkeys(measured.labels[name] for name in (first, second))
+            what = f"{first} and {second} count the same ({', '.join(columns)}) while the reference turns"
+            raise InputError(what, where=where, expected="a column of each")
 
 
 def _quotient(wheels: Array, reference: Array, much: Flags) -> float:

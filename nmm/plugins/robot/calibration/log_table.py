@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import warnings
 from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -64,6 +65,9 @@ class TextTable:
     def read(self, wanted: Sequence[str]) -> Columns:
         """Its columns of these names; `InputError` by line and column for what is no number."""
         self.expect_columns(wanted, str(self.path))
+        if (cells := self._plain()) is not None:
+            columns = {name: cells[:, self.header.index(name)].copy() for name in wanted}
+            return Columns(columns, np.arange(2, len(cells) + 2), cut=False)
         places = [self.header.index(name) for name in wanted]
         values, at, most = [array("d") for _ in wanted], array("q"), len(self.header)
         ended = self._ends()
@@ -87,6 +91,24 @@ class TextTable:
                     column.append(number)
                 at.append(line)
         return self._table(wanted, values, at, cut=False)
+
+    def _plain(self) -> Array | None:
+        """All cells (N, columns) of a table of nothing but numbers, a row a line: read at once, in a tenth of
+        the time; None of another."""
+        if not self._ends():
+            return None
+        delimiter = None if self._delimiter == " " else self._delimiter
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of a table without rows
+                cells = np.loadtxt(
+                    self.path, delimiter=delimiter, skiprows=1, ndmin=2, comments=None, encoding="utf-8-sig"
+                )
+        except (ValueError, OSError):
+            return None
+        with self.path.open("rb") as file:
+            lines = sum(block.count(b"\n") for block in iter(lambda: file.read(2**20), b""))
+        return cells if cells.shape == (lines - 1, len(self.header)) and len(cells) else None
 
     def _table(self, wanted: Sequence[str], values: list[array[float]], at: array[int], cut: bool) -> Columns:
         columns = {name: np.array(column) for name, column in zip(wanted, values, strict=True)}
@@ -164,7 +186,9 @@ class _Lines:
             if not text:
                 return
             number += 1
-            expect(len(text) < LONGEST, f"{self._path}: line {number}", f"at most {LONGEST} characters")
+            if len(text) >= LONGEST:
+                where = f"{self._path}: line {number}"
+                raise InputError(where=where, expected=f"at most {LONGEST} characters")
             if text.strip() and (first or not text.startswith("#")):
                 first = False
                 yield number, text.rstrip("\r\n")

@@ -153,14 +153,22 @@ class Units:
     A unit of a column stands before that of its group; wheels' is no joint's that steers.
     """
 
-    def __init__(self, stated: Mapping[str, str] | str | None, columns: Iterable[str], where: str) -> None:
+    def __init__(
+        self,
+        stated: Mapping[str, str] | str | None,
+        columns: Iterable[str],
+        where: str,
+        groups: Mapping[str, tuple[str, str]] = GROUPS,
+    ) -> None:
+        self._groups = groups
         self._where = f"{where}: units"
         self._si = stated == SI
         if not self._si and not isinstance(stated, Mapping | None):
-            expected = f"{SI!r}, or by group or column, as {{'wheels': 'ticks:2048'}}"
+            example = next(iter(groups))
+            expected = f"{SI!r}, or by group or column, as {{{example!r}: 'ticks:2048'}}"
             raise InputError(where=self._where, expected=expected, got=stated)
         self._stated = {} if stated is None or isinstance(stated, str) else dict(stated)
-        known = [*GROUPS, *columns]
+        known = [*groups, *columns]
         for name in self._stated:
             if name not in known:
                 raise no_such("group or column", name, known, self._where)
@@ -168,7 +176,7 @@ class Units:
 
     def group(self, group: str, column: str = "") -> Unit | None:
         """The unit of a column of a group; None where nobody stated it, which `expect_all` then says."""
-        quantity, si = GROUPS[group]
+        quantity, si = self._groups[group]
         for name in (column, group, "time" if group == "reference_time" else group):
             if name in self._stated:
                 where = f"{self._where}: {name}"

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import copy
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,12 +12,14 @@ import numpy as np
 from nmm.base.arrays import Array
 from nmm.base.kernels.compiled import checked_by_caller
 from nmm.model.robots.numbers import robot_numbers, with_numbers
+from nmm.model.robots.origins import arm_joints
 from nmm.model.robots.robot import Robot
 from nmm.plugins.robot.calibration.drives import RobotDrive, path
 from nmm.plugins.robot.calibration.innovations import BEGINS, INNOVATIONS, TAKEN, innovations
 from nmm.plugins.robot.calibration.parameters import CLOCK, DELAY, MOUNT, Learned, learned
-from nmm.plugins.robot.calibration.planar import along_body, composed, placed
-from nmm.plugins.robot.calibration.stretches import Stretches, steps_between, stretches
+from nmm.plugins.robot.calibration.planar import alignment, along_body
+from nmm.plugins.robot.calibration.sides import SideRows, Slopes, agreement, following
+from nmm.plugins.robot.calibration.stretches import SIDES, Stretches, steps_between, stretches
 from nmm.plugins.robot.counted_motion import Counted
 from nmm.plugins.robot.odometry import Counters
 
@@ -52,25 +53,6 @@ class DriveNoise(NamedTuple):
     jitter: float
 
 
-class Slopes(NamedTuple):
-    """Of a drive's stretches in f numbers: of their ends (M - 1, 3, f), of what is spare (M - 1, k, f) and
-    of what is astray (M - 1, n_p - 3, f)."""
-
-    ends: Array
-    spare: Array
-    astray: Array
-
-
-class SideRows(NamedTuple):
-    """What is known beside the reference, over its deviation: (R,), with slopes (R, f); the sum of the
-    variances' logarithms; how many of the numbers are free."""
-
-    over: Array
-    slopes: Array
-    logarithms: float
-    free: int
-
-
 Made = tuple[Stretches, Slopes]
 
 
@@ -95,6 +77,14 @@ class Filtered:
             total += part.over @ part.over + part.logarithms
         return float(-0.5 * total)
 
+    def without_slopes(self) -> Filtered:
+        """The same, with less memory."""
+        sides = [
+            part._replace(slopes=np.zeros((0, 0)), weights=np.zeros(0))
+            for part in (self.agreement, self.following)
+        ]
+        return replace(self, W=np.zeros((0, 0, 0)), agreement=sides[0], following=sides[1])
+
     @property
     def count(self) -> int:
         """How many numbers are free to be off."""
@@ -108,13 +98,16 @@ class Model:
     learned : the numbers, in order; `first` (n,) : their values at first
     """
 
-    def __init__(self, robot: Robot, counters: Counters, drives: Sequence[RobotDrive], delay: float) -> None:
+    def __init__(self, robot: Robot, counters: Counters, drives: Sequence[RobotDrive]) -> None:
         self.robot, self.counters, self.drives = robot, counters, [*drives]
-        self.learned = _learnable(robot, counters, self.drives, delay)
+        self.learned = _learnable(robot, counters, self.drives)
         self.first = np.array([number.value for number in self.learned])
         self.scales = np.array([number.plausible for number in self.learned])
         self._own_names = {*robot_numbers(robot)}
         self._records: dict[tuple[float, ...], Counted] = {}
+        #: Of each own joint, its noise as a share of `DriveNoise.following`.
+        self.hitch_shares = np.ones(robot.platform.n_p - 3)
+        self._last: tuple[bytes, list[int], list[Made]] | None = None
         self._filter = checked_by_caller(innovations, INNOVATIONS)
 
     @property
@@ -151,8 +144,17 @@ class Model:
     def of(self, drives: Sequence[RobotDrive]) -> Model:
         """The model of other drives."""
         made = copy.copy(self)
-        made.drives = [*drives]
+        made.drives, made._last = [*drives], None
         return made
+
+    def take(self, drives: Sequence[RobotDrive]) -> None:
+        """Go on with other drives."""
+        self.drives, self._last = [*drives], None
+
+    @property
+    def begun(self) -> int:
+        """How often the filter begins, at first, after gaps and where the reference jumped."""
+        return sum(int(np.count_nonzero(drive.taken == BEGINS)) for drive in self.drives)
 
     @property
     def with_looks(self) -> list[RobotDrive]:
@@ -184,25 +186,44 @@ class Model:
             self._records[key] = Counters(robot, names, self.counters.where).record
         return self._records[key]
 
-    def _moved(self, values: Array, drive: RobotDrive) -> Stretches:
-        """The stretches of a drive by these numbers."""
+    def _moved(self, values: Array, drive: RobotDrive, whole: bool = True, sides: bool = True) -> Stretches:
+        """The stretches of a drive by these numbers, with slopes and noise where whole, and with its sides.
+
+        Sides are of the counters alone, and are told between times by the first delay: between two readings
+        a counter has less noise than at one, and the delay would seem to be whatever puts the looks there."""
         counts, own, at = drive.counts, drive.own, drive.at
-        for number, value in zip(self.learned, values.tolist(), strict=True):
+        beside = at
+        for i, (number, value) in enumerate(zip(self.learned, values.tolist(), strict=True)):
             kind, _, name = number.name.partition(".")
             if kind == "scale":
                 counts = _scaled(counts, self.counters.names.index(name), value, 0.0)
             elif kind == "ratio":
                 offset = float(values[self.index(f"offset.{name}")])
                 own = _scaled(own, self.robot.coordinate(name) - 3, value, offset)
-            elif kind == DELAY and not drive.ends:
-                at = at - value
-            elif kind == CLOCK and not drive.ends:
+            elif kind == DELAY and name == drive.number and not drive.ends:
+                at, beside = at - value, beside - float(self.first[i])
+            elif kind == CLOCK and name == drive.number and not drive.ends:
                 at = at - value * (drive.at - drive.middle)
-        return stretches(self._record(values), drive.t, counts, own, at, steps_between(drive.at))
+        given = self._record(values), drive.t, counts, own
+        steps = steps_between(drive.at)
+        some = counts.shape[1] > self.free_inputs or drive.hitches
+        if not sides or not some or np.array_equal(at, beside):
+            return stretches(*given, at, steps, whole, sides)
+        made = stretches(*given, at, steps, whole, sides=False)
+        others = stretches(*given, beside, steps, whole)
+        return made._replace(**{name: getattr(others, name) for name in SIDES})
 
     def stretched(self, values: Array, free: Sequence[int]) -> list[Made]:
-        """Of each drive its stretches, and their slopes in the free numbers."""
-        return [self._with_slopes(values, free, drive) for drive in self.drives]
+        """Of each drive its stretches, and their slopes in the free numbers; kept until the next numbers."""
+        key = values.tobytes()
+        if self._last is None or self._last[0] != key or not {*free} <= {*self._last[1]}:
+            self._last = None  # or memory would hold both
+            self._last = key, [*free], [self._with_slopes(values, free, drive) for drive in self.drives]
+        _, known, found = self._last
+        if known == [*free]:
+            return found
+        some = [known.index(i) for i in free]
+        return [(made, Slopes(*(part[:, :, some] for part in slopes))) for made, slopes in found]
 
     def _with_slopes(self, values: Array, free: Sequence[int], drive: RobotDrive) -> Made:
         made = self._moved(values, drive)
@@ -218,15 +239,23 @@ class Model:
                 place = self.counters.names.index(number.name.partition(".")[2])
                 slopes.ends[:, :, column] = made.slopes[:, :, place] / values[i]
                 slopes.spare[:, :, column] = made.spare_slopes[:, :, place] / values[i]
+            elif number.kind in (DELAY, CLOCK) and number.name.partition(".")[2] != drive.number:
+                continue
             elif number.name not in MOUNT:
+                sides = number.kind not in (DELAY, CLOCK)
                 step, ahead = _STEP * number.plausible, values.copy()
                 ahead[i] += step
-                other = self._moved(ahead, drive)
+                other = self._moved(ahead, drive, whole=False, sides=sides)
                 ends = along_body(made.motions[:, 2], other.motions - made.motions)
                 slopes.ends[:, :, column] = ends / step
-                slopes.spare[:, :, column] = (other.spare - made.spare) / step
-                slopes.astray[:, :, column] = (other.astray - made.astray) / step
+                if sides:
+                    slopes.spare[:, :, column] = (other.spare - made.spare) / step
+                    slopes.astray[:, :, column] = (other.astray - made.astray) / step
         return made, slopes
+
+    def forget(self) -> None:
+        """Let go of the stretches that are kept."""
+        self._last = None
 
     def filtered(
         self, values: Array, free: Sequence[int], made: Sequence[Made], noise: DriveNoise
@@ -255,7 +284,6 @@ class Model:
         ends = slopes.ends if slopes.ends.shape[2] else np.zeros((len(made.motions), 3, 1))
         many, r = len(drive.at), drive.rows
         variances = np.array([noise.counters, noise.across, noise.turns]) ** 2
-        Q = np.tensordot(made.noise, variances, axes=([1], [0]))
         z = drive.z if r == 3 else _with_headings(drive, made, mount, max(SEEN, 30.0 * noise.place))
         R = np.array([noise.place**2, noise.place**2, noise.heading**2 if r == 3 else 1.0])
         R = R + (noise.jitter * _speeds(drive, made)) ** 2
@@ -265,25 +293,12 @@ class Model:
             np.zeros((many, r)),
             np.zeros((many, 3)),
             drive.taken == TAKEN,
-            self._agreement(made, slopes, noise),
-            _following(drive, made, slopes, noise),
+            agreement(drive, made, slopes, noise.agreement, self.free_inputs),
+            following(drive, made, slopes, noise.following * self.hitch_shares),
         )
-        arrays = [np.ascontiguousarray(array) for array in (made.motions, ends, Q, z)]
-        self._filter(*arrays, drive.taken, R, mount, columns, result.w, result.S, result.W, result.poses)
+        given = made.motions, np.ascontiguousarray(ends), made.noise, variances, np.ascontiguousarray(z)
+        self._filter(*given, drive.taken, R, mount, columns, result.w, result.S, result.W, result.poses)
         return result
-
-    def _agreement(self, made: Stretches, slopes: Slopes, noise: DriveNoise) -> SideRows:
-        """What counters say beyond motions, where they went, over the deviation that their noise gives it."""
-        k, free = made.spare.shape[1], self.free_inputs
-        went = made.counted.mean(axis=1)
-        moved = went > 0.0
-        if k <= free or not np.any(moved):
-            return SideRows(np.zeros(0), np.zeros((0, slopes.spare.shape[2])), 0.0, 0)
-        deviation = noise.agreement * np.sqrt(went[moved])[:, np.newaxis]
-        over = (made.spare[moved] / deviation).ravel()
-        rows = (slopes.spare[moved] / deviation[:, :, np.newaxis]).reshape(len(over), -1)
-        logarithms = 2.0 * (k - free) * float(np.sum(np.log(deviation)))
-        return SideRows(over, rows, logarithms, (k - free) * len(deviation))
 
 
 def _speeds(drive: RobotDrive, made: Stretches) -> Array:
@@ -294,19 +309,12 @@ def _speeds(drive: RobotDrive, made: Stretches) -> Array:
     return np.concatenate([speeds[:1], 0.5 * (speeds[1:] + speeds[:-1]), speeds[-1:]])
 
 
-def _following(drive: RobotDrive, made: Stretches, slopes: Slopes, noise: DriveNoise) -> SideRows:
-    """How far hitches turned otherwise than they follow, over the deviation of it."""
-    over = made.astray[:, drive.hitches].ravel() / noise.following
-    rows = slopes.astray[:, drive.hitches].reshape(len(over), slopes.astray.shape[2]) / noise.following
-    return SideRows(over, rows, 2.0 * len(over) * math.log(noise.following), len(over))
-
-
 def _with_headings(drive: RobotDrive, made: Stretches, mount: Array, far: float) -> Array:
     """z with a heading where a drive begins: that which lays the next `far` m by wheels along the places."""
     z = drive.z.copy()
     begins = np.flatnonzero(drive.taken == BEGINS)
     for first, last in zip(begins, [*begins[1:], len(z)], strict=True):
-        z[first, 2] = _alignment(drive.z[first:last, :2], made.motions[first : last - 1], mount, far)
+        z[first, 2] = alignment(drive.z[first:last, :2], made.motions[first : last - 1], mount, far)
     return z
 
 
@@ -316,18 +324,7 @@ def _scaled(table: Array, column: int, by: float, more: float) -> Array:
     return made
 
 
-def _alignment(places: Array, motions: Array, mount: Array, far: float) -> float:
-    """The heading at the first place that lays the next `far` m by wheels along the places."""
-    poses = composed(motions)
-    beyond = np.flatnonzero(np.hypot(poses[:, 0], poses[:, 1]) > far)
-    many = int(beyond[0]) + 1 if len(beyond) else len(poses)
-    went, seen = placed(poses, mount)[:many, :2], places[:many]
-    went, seen = went - went.mean(axis=0), seen - seen.mean(axis=0)
-    cross = np.sum(went[:, 0] * seen[:, 1] - went[:, 1] * seen[:, 0])
-    return float(np.arctan2(cross, np.sum(went * seen)))
-
-
-def _learnable(robot: Robot, counters: Counters, drives: Sequence[RobotDrive], delay: float) -> list[Learned]:
+def _learnable(robot: Robot, counters: Counters, drives: Sequence[RobotDrive]) -> list[Learned]:
     known = robot_numbers(robot)
     found = []
     for name in counters.names:
@@ -336,12 +333,18 @@ def _learnable(robot: Robot, counters: Counters, drives: Sequence[RobotDrive], d
     for name in counters.names:
         if name in robot.platform.inputs:
             found.append(learned(f"scale.{name}", "1", 1.0))
+    unseen = {*arm_joints(robot)}  # wheels do not show an arm's numbers, nor where frames are
     for name, number in known.items():
-        if number.kind == "radius" or (number.kind == "hitch" and not all(drive.hitches for drive in drives)):
+        if number.kind in ("radius", "origin") or number.of in unseen:
+            continue
+        if number.kind == "hitch" and not all(drive.hitches for drive in drives):
             continue
         found.append(learned(name, number.unit, number.value))
     looked = [drive.rows for drive in drives if not drive.ends]
     if looked:
         found += [learned(name, "m" if name != MOUNT[2] else "rad", 0.0) for name in MOUNT[: max(looked)]]
-        found += [learned(DELAY, "s", delay), learned(CLOCK, "1", 0.0)]
+    for drive in drives:
+        if not drive.ends:
+            more = f".{drive.number}" if drive.number else ""
+            found += [learned(DELAY + more, "s", drive.delay), learned(CLOCK + more, "1", 0.0)]
     return found

@@ -25,6 +25,8 @@ PLAUSIBLE: dict[str, tuple[float, float, str]] = {
 }
 #: Of any other number, a length.
 LENGTH = (0.2, 0.0, "turn on the spot, both ways")
+#: How far from the file's a length of 0 may lie, m.
+NEAR = 0.1
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,7 @@ class Learned:
     value : in the robot's file, or at first
     plausible : how far from this it may lie, in its unit: the scale by which it is judged what is shown
     shown_by : the motion that shows it
+    role : of an arm what it is to it, "" of a platform
     """
 
     name: str
@@ -42,6 +45,7 @@ class Learned:
     value: float
     plausible: float
     shown_by: str
+    role: str = ""
 
     @property
     def of_robot(self) -> bool:
@@ -56,4 +60,31 @@ class Learned:
 def learned(name: str, unit: str, value: float) -> Learned:
     """With what is usual for its kind."""
     share, absolute, shown_by = PLAUSIBLE.get(name.split(".")[0], LENGTH)
-    return Learned(name, unit, value, share * abs(value) + absolute, shown_by)
+    return Learned(name, unit, value, share * abs(value) + absolute or NEAR, shown_by)
+
+
+@dataclass(frozen=True)
+class LearnedNumber:
+    """A number, before and after.
+
+    Attributes
+    ----------
+    before : by the robot's file, or 0 for what is none of the robot's
+    after : learned, or what it was held at
+    deviation : standard deviation of it, 0 where it was held
+    unit : "m", "rad", "s" or "1"
+    why : "learned"; "held" as was asked; "not shown" by the logs; of an arm also "as others", which do the
+        same whatever it does, and "sign" of a ratio that is known but for it
+
+    Examples
+    --------
+    >>> track = nmm.LearnedNumber(before=0.5, after=0.56, deviation=0.004, unit="m", why="learned")
+    >>> round((track.after - track.before) / track.deviation)
+    15
+    """
+
+    before: float
+    after: float
+    deviation: float
+    unit: str
+    why: str

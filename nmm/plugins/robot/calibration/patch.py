@@ -3,34 +3,29 @@
 from __future__ import annotations
 
 import math
-import statistics
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from nmm.base.errors import InputError, expect_kind
+from nmm.base.errors import InputError, expect_kind, few
 from nmm.base.files import replaceable, whole_file, written_at
-from nmm.model.platforms.wheel_layout import NEAR
 from nmm.model.robots.loading import load
 from nmm.model.robots.loading.description import describe
 from nmm.model.robots.loading.source import source_path
 from nmm.model.robots.loading.xml_tree import trying
-from nmm.model.robots.numbers import OF_SPEEDS, main_wheels, robot_numbers, with_numbers
+from nmm.model.robots.numbers import numbers_for, robot_numbers, with_numbers
+from nmm.model.robots.origins import placed_by
 from nmm.model.robots.robot import Robot
+from nmm.plugins.robot.calibration.arm_patch import arm_numbers, misplaced
+from nmm.plugins.robot.calibration.expressible import UNSAID, expressible, missed, same
 from nmm.plugins.robot.calibration.text_edits import unified_diff
 from nmm.plugins.robot.calibration.urdf_patch import UrdfPatch
-from nmm.plugins.robot.calibration.xacro_patch import held_by, solved_arguments
+from nmm.plugins.robot.calibration.xacro_patch import Load, held_by, solved_arguments
 from nmm.scenario.calibration_file import Calibrated, CalibrationFile
 
-#: A number is another's where they differ by a smaller share.
-CLOSE = 1e-6
-#: Why numbers stay in calibration.yaml, by their kinds.
-_UNSAID = {
-    "offset": "URDF has no word for a joint's offset",
-    "ratio": "URDF has no word for a joint's ratio",
-    "centre": "URDF has no word for where wheels slide: the ground makes these centres",
-}
+#: So many numbers that stay for one reason are told one by one.
+EACH = 4
 
 
 @dataclass(frozen=True)
@@ -46,7 +41,10 @@ class DescriptionPatch:
     places : where a xacro file holds numbers that no argument gives, by number
     numbers : what the robot of the corrected file has, by name, m, rad and 1
     left : the numbers that the file cannot say, each with the reason: they stay in calibration.yaml
+    written : numbers of arms and frames that the corrected file has in origins and axes: by it they are 0 (a
+        ratio 1), and coordinates are what encoders read
     wanted : what was asked for, and what the file's other numbers were where they cannot stay
+    at : where the corrected file has the arm's joints and frames (`Robot.file_places`)
 
     Examples
     --------
@@ -62,7 +60,9 @@ class DescriptionPatch:
     places: Mapping[str, str] = field(default_factory=dict)
     numbers: Mapping[str, float] = field(default_factory=dict)
     left: Mapping[str, str] = field(default_factory=dict)
+    written: tuple[str, ...] = ()
     wanted: Mapping[str, float] = field(default_factory=dict)
+    at: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     def __str__(self) -> str:
         """What is to be done, a line each."""
@@ -71,8 +71,13 @@ class DescriptionPatch:
             texts = " ".join(f"{name}:={text}" for name, text in self.arguments.items())
             lines.append(f"{self.file.name}: arguments {texts}")
         lines += [f"{name}: {place}" for name, place in self.places.items()]
-        for name, why in self.left.items():
-            lines.append(f"{name} = {self.wanted[name]:.6g} stays in calibration.yaml: {why}")
+        reasons = dict.fromkeys(self.left.values())
+        for why in reasons:
+            names = [name for name, own in self.left.items() if own == why]
+            if len(names) > EACH:
+                lines.append(f"{len(names)} numbers stay in calibration.yaml: {why}: {few(names, shown=3)}")
+                continue
+            lines += [f"{name} = {self.wanted[name]:.6g} stays in calibration.yaml: {why}" for name in names]
         return "\n".join(lines or [f"{self.file.name}: nothing is to change"])
 
     def save(self, folder: str | Path) -> list[Path]:
@@ -102,9 +107,11 @@ class DescriptionPatch:
         numbers = {
             name: Calibrated(self.numbers[name], value, spread.get(name, math.nan))
             for name, value in values.items()
-            if name in self.numbers and not _same(self.numbers[name], value)
+            if name in self.numbers and name not in self.written and not same(self.numbers[name], value)
         }
-        return replace(learned, numbers=numbers)
+        return replace(
+            learned, numbers=numbers, places={n: at for n, at in self.at.items() if _of(n, numbers)}
+        )
 
 
 def description_patch(
@@ -113,9 +120,9 @@ def description_patch(
     """What a robot's file has to say for the robot to have other numbers.
 
     A URDF is edited at its attributes: radii of wheels' shapes, and the height of their centres where that is
-    the radius; places of wheels, steering joints and hitches. Of a xacro file the arguments are found that
-    give the numbers, by loading it with each a little changed, or where it holds a number. What was found is
-    loaded, and says which numbers it has.
+    the radius; places of wheels, steering joints and hitches; origins of an arm's joints and of frames, which
+    offsets turn, too, and axes, which a ratio of -1 turns. Of a xacro file the arguments are found that give
+    the numbers, by loading it with each a little changed, or where it holds one. What was found is loaded.
 
     Parameters
     ----------
@@ -153,77 +160,72 @@ def description_patch(
 
     base = made(robot.arguments)
     _check_same(robot, base)
-    goal = {name: number.nominal for name, number in robot_numbers(robot).items()}
+    goal = {name: number.nominal for name, number in numbers_for(robot, asked).items()}
     goal |= {
         name: number.value
-        for name, number in robot_numbers(with_numbers(base, asked)).items()
+        for name, number in numbers_for(with_numbers(base, asked), asked).items()
         if name in asked
     }
-    writable, left = _expressible(base, goal)
+    writable, left = expressible(base, goal, described.expanded)
     if described.expanded:
         return _of_xacro(file, base, goal, writable, left, made, robot.arguments, asked)
     content = file.read_bytes()
-    edited = UrdfPatch(base, writable, content)
+    edited, reached = _edited(base, writable, content, file, made)
     left |= edited.left
+    numbers = {name: number.value for name, number in numbers_for(reached, goal).items()}
+    left |= missed(goal, numbers, {*left, *edited.written}, "file gives")
     text = edited.text.edited()
-    with trying({file: text}):
-        reached = {name: number.value for name, number in robot_numbers(made({})).items()}
-    left |= _missed(goal, reached, left, "file gives")
     changed = text != content
     return DescriptionPatch(
         file,
         text.decode("utf-8") if changed else "",
         unified_diff(file.name, content, text),
-        numbers=reached,
+        numbers=numbers,
         left=left,
+        written=edited.written,
         wanted={name: goal[name] for name in (*asked, *left)},
+        at=_places(reached, goal),
     )
+
+
+def _places(robot: Robot, names: Collection[str]) -> dict[str, tuple[float, ...]]:
+    """Where its file has the joints and frames of numbers."""
+    known = numbers_for(robot, names)
+    return robot.file_places(dict.fromkeys(arm_numbers(robot, known).values()))
+
+
+def _of(place: str, numbers: Collection[str]) -> bool:
+    """Whether a joint or frame has one of these numbers."""
+    return any(name in (f"offset.{place}", f"ratio.{place}") or placed_by(name) == place for name in numbers)
+
+
+def _edited(
+    base: Robot, writable: Mapping[str, float], content: bytes, file: Path, made: Load
+) -> tuple[UrdfPatch, Robot]:
+    """The edits, and the robot of the corrected file; the arm's numbers are left where that does not have its
+    joints as they have them."""
+    edited = UrdfPatch(base, writable, content)
+    with trying({file: edited.text.edited()}):
+        reached = made({})
+    wrong = misplaced(edited.nodes, edited.changed, reached) if edited.written else ""
+    if not wrong:
+        return edited, reached
+    lost = dict.fromkeys(edited.written, f"the corrected file does not have {wrong} where it is to be")
+    plain = {name: value for name, value in writable.items() if name not in lost}
+    rest, reached = _edited(base, plain, content, file, made)
+    rest.left |= {**edited.left, **lost}
+    return rest, reached
 
 
 def _check_same(robot: Robot, base: Robot) -> None:
     """`InputError` where the file, as it is loaded here, is that of a robot with other numbers."""
-    own, other = robot_numbers(robot), robot_numbers(base)
-    apart = [n for n, number in own.items() if n not in other or not _same(number.nominal, other[n].value)]
+    own = robot_numbers(robot)
+    other = numbers_for(base, own)
+    apart = [n for n, number in own.items() if n not in other or not same(number.nominal, other[n].value)]
     if apart or own.keys() != other.keys():
         name = (apart or [*(other.keys() - own.keys())])[0]
         expected = "the arguments that nmm.load was given: platform=, wheels=, axle=, steer=, lock="
         raise InputError(f"its file gives another {name}", where=robot.name, expected=expected)
-
-
-def _expressible(base: Robot, goal: Mapping[str, float]) -> tuple[dict[str, float], dict[str, str]]:
-    """The numbers that a file could say, and why it cannot say the others; of radii that differ too much for
-    the platform, it says their mean."""
-    numbers, left = robot_numbers(base), dict[str, str]()
-    writable = {name: value for name, value in goal.items() if value != numbers[name].value}
-    for name in [*writable]:
-        if numbers[name].kind in _UNSAID:
-            left[name] = _UNSAID[numbers[name].kind]
-            del writable[name]
-        elif name == "radius":
-            left[name] = "the file shows no wheels"
-            del writable[name]
-    names = [f"radius.{wheel.joint}" for wheel in main_wheels(base)]
-    radii = [goal[name] for name in names]
-    if isinstance(base.platform, OF_SPEEDS) and radii and max(radii) - min(radii) > NEAR:
-        mean = statistics.mean(radii)
-        for name in names:
-            writable[name] = mean
-            left[name] = (
-                f"a {base.platform.name} platform has one radius: the file gets the mean, {mean:.6g} m, and "
-                "the difference stays"
-            )
-    return writable, left
-
-
-def _missed(
-    goal: Mapping[str, float], reached: Mapping[str, float], left: Mapping[str, str], gives: str
-) -> dict[str, str]:
-    """The numbers that the corrected file does not give, in spite of all."""
-    return {
-        name: f"the {gives} {reached[name]:.6g}"
-        for name, value in goal.items()
-        if name in reached and name not in left and not _same(reached[name], value)
-    }
 
 
 def _of_xacro(
@@ -232,15 +234,17 @@ def _of_xacro(
     goal: Mapping[str, float],
     writable: dict[str, float],
     left: Mapping[str, str],
-    made: Any,
+    made: Load,
     arguments: Mapping[str, str],
     asked: Mapping[str, float],
 ) -> DescriptionPatch:
     own = robot_numbers(base)
-    before = {name: number.value for name, number in own.items() if number.kind not in _UNSAID}
+    before = {name: number.value for name, number in own.items() if number.kind not in (*UNSAID, "origin")}
     wanted = {name: goal[name] for name in before if name in asked} | writable
     solved, moved = solved_arguments(made, arguments, before, wanted)
-    reached = {name: number.value for name, number in robot_numbers(made({**arguments, **solved})).items()}
+    corrected = made({**arguments, **solved})
+    found = numbers_for(corrected, goal)
+    reached = {name: number.value for name, number in found.items()}
     with trying({}) as tried:
         made(arguments)
     files = list(dict.fromkeys(tried.read))
@@ -251,12 +255,16 @@ def _of_xacro(
         place = held_by(lambda: made(arguments), files, name, before, value - before[name])
         places[name] = place or "it is computed, by no argument and no number of its own"
         why[name] = "no argument gives it"
-    why |= _missed(goal, reached, why, "arguments give")
+    why |= missed(goal, reached, why, "arguments give")
     wanted = {name: goal[name] for name in (*asked, *why)}
     return DescriptionPatch(
-        file, "", "", arguments=solved, places=places, numbers=reached, left=why, wanted=wanted
+        file,
+        "",
+        "",
+        arguments=solved,
+        places=places,
+        numbers=reached,
+        left=why,
+        wanted=wanted,
+        at=_places(corrected, goal),
     )
-
-
-def _same(one: float, other: float) -> bool:
-    return abs(one - other) <= CLOSE * max(abs(one), abs(other))

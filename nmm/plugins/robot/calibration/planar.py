@@ -26,3 +26,14 @@ def along_body(turned: Array, steps: Array) -> Array:
     c, s = np.cos(turned), np.sin(turned)
     x, y = steps[:, 0], steps[:, 1]
     return np.stack([c * x + s * y, c * y - s * x, steps[:, 2]], axis=1)
+
+
+def alignment(places: Array, motions: Array, mount: Array, far: float) -> float:
+    """The heading at the first place that lays the next `far` m by wheels along the places."""
+    poses = composed(motions)
+    beyond = np.flatnonzero(np.hypot(poses[:, 0], poses[:, 1]) > far)
+    many = int(beyond[0]) + 1 if len(beyond) else len(poses)
+    went, seen = placed(poses, mount)[:many, :2], places[:many]
+    went, seen = went - went.mean(axis=0), seen - seen.mean(axis=0)
+    cross = np.sum(went[:, 0] * seen[:, 1] - went[:, 1] * seen[:, 0])
+    return float(np.arctan2(cross, np.sum(went * seen)))

@@ -30,6 +30,10 @@ LONGEST = 0.05
 COUNTERS, ACROSS, TURNS = range(3)
 
 
+#: Of `Stretches`, what is known beside motions.
+SIDES = ("spare", "spare_slopes", "astray", "counted")
+
+
 class Stretches(NamedTuple):
     """Motions between M times, in the axes of where each begins; errors are along the axes of where it ends.
 
@@ -110,9 +114,12 @@ def follow_counters(
     astray: Array,
     gone: Array,
     regular: Array,
+    whole: int,
+    sides: int,
 ) -> None:
     """`Stretches` between the rows `looks` (M,) of counters (N, k) and own joints (N, n_p - 3), all linear
-    between rows; the record lies at the blocks' beginning."""
+    between rows; the record lies at the blocks' beginning. Noise and slopes are empty where it is not whole
+    (0), spare, its slopes and astray where nothing beside motions is asked for (0)."""
     counted = views(Counted, integers, floats, 0)
     k, joints, p = counts.shape[1], own.shape[1], counted.steered.shape[0]
     by, begin, end, up = scratch(k), scratch(joints), scratch(joints), scratch(p)
@@ -130,12 +137,15 @@ def follow_counters(
         clear(Q)
         clear(over)
         regular[m] = math.inf
-        for j in range(joints):
-            astray[m, j] = own[int(looks[m + 1]), j] - own[int(looks[m]), j]
+        if sides == 1:
+            for j in range(joints):
+                astray[m, j] = own[int(looks[m + 1]), j] - own[int(looks[m]), j]
         for c in range(k):
             gone[m, c] = 0.0
-            for j in range(k):
-                spare_slopes[m, c, j] = 0.0
+        if whole == 1 and sides == 1:
+            for c in range(k):
+                for j in range(k):
+                    spare_slopes[m, c, j] = 0.0
         for n in range(int(looks[m]), int(looks[m + 1])):
             for c in range(k):
                 by[c] = counts[n + 1, c] - counts[n, c]
@@ -144,7 +154,7 @@ def follow_counters(
             regular[m] = min(regular[m], counted_motion(counted, begin, end, by, up, twist, turned))
             for c in range(k):
                 gone[m, c] += abs(by[c])
-            if joints > 0:
+            if joints > 0 and sides == 1:
                 clear(qp)
                 clear(H)
                 clear(H_q)
@@ -154,14 +164,17 @@ def follow_counters(
                 for j in range(joints):
                     for i in range(p):
                         astray[m, j] -= H[3 + j, i] * up[i]
-            if k > inputs:
+            if k > inputs and sides == 1:
                 disagreement(counted, begin, end, by, up, over, P)
-                for c in range(k):
-                    for j in range(k):
-                        spare_slopes[m, c, j] += P[c, j] * by[j]
+                if whole == 1:
+                    for c in range(k):
+                        for j in range(k):
+                            spare_slopes[m, c, j] += P[c, j] * by[j]
             right_jacobian_planar(twist, step, G)
-            inverse_adjoint_planar(step, A)
             compose_planar(pose, step)
+            if whole == 0:
+                continue
+            inverse_adjoint_planar(step, A)
             for i in range(3):
                 for c in range(k):
                     carried[i, c] = 0.0
@@ -195,19 +208,21 @@ def follow_counters(
                     J[i, c] = carried[i, c] + J[i, c] * by[c]
         for i in range(3):
             motions[m, i] = pose[i]
+            if whole == 1:
+                for c in range(k):
+                    slopes[m, i, c] = J[i, c]
+                for kind in range(3):
+                    for j in range(3):
+                        noise[m, kind, i, j] = Q[3 * kind + i, j]
+        if sides == 1:
             for c in range(k):
-                slopes[m, i, c] = J[i, c]
-            for kind in range(3):
-                for j in range(3):
-                    noise[m, kind, i, j] = Q[3 * kind + i, j]
-        for c in range(k):
-            spare[m, c] = over[c]
+                spare[m, c] = over[c]
 
 
 _FLAT, _ROWS = float64[::1], float64[:, ::1]
 FOLLOW = void(
     *(int64[::1], _FLAT, _ROWS, _ROWS, int64[::1], _ROWS, float64[:, :, ::1], float64[:, :, :, ::1]),
-    *(_ROWS, float64[:, :, ::1], _ROWS, _ROWS, _FLAT),
+    *(_ROWS, float64[:, :, ::1], _ROWS, _ROWS, _FLAT, int64, int64),
 )
 
 
@@ -217,22 +232,33 @@ def steps_between(at: Array) -> Integers:
 
 
 def stretches(
-    record: Counted, t: Array, counts: Array, own: Array, at: Array, steps: Integers | None = None
+    record: Counted,
+    t: Array,
+    counts: Array,
+    own: Array,
+    at: Array,
+    steps: Integers | None = None,
+    whole: bool = True,
+    sides: bool = True,
 ) -> Stretches:
     """See `follow_counters`: between the times `at` (M,), s, by readings at t (N,), each stretch in equal
-    steps of at most `LONGEST`. NaN where the counters do not determine the motion."""
+    steps of at most `LONGEST`; with slopes and noise where it is whole, and with what is known beside
+    motions. NaN where the counters do not determine the motion."""
     memory = Memory()
     memory.add(record)
     looks = np.concatenate([[0], np.cumsum(steps_between(at) if steps is None else steps)])
     grid = np.interp(np.arange(looks[-1] + 1), looks, at)
     many, k = len(at) - 1, counts.shape[1]
+    some, beside = many * whole, many * sides
     made = Stretches(
-        *(np.zeros((many, 3)), np.zeros((many, 3, k)), np.zeros((many, 3, 3, 3))),
-        *(np.zeros((many, k)), np.zeros((many, k, k))),
-        *(np.zeros((many, own.shape[1])), np.zeros((many, k)), np.zeros(many)),
+        *(np.zeros((many, 3)), np.zeros((some, 3, k)), np.zeros((some, 3, 3, 3))),
+        *(np.zeros((beside, k)), np.zeros((some * sides, k, k))),
+        *(np.zeros((beside, own.shape[1])), np.zeros((many, k)), np.zeros(many)),
     )
     tables = [at_times(grid, t, table) for table in (counts, own)]
-    checked_by_caller(follow_counters, FOLLOW)(*memory.blocks(), *tables, looks, *made)
+    checked_by_caller(follow_counters, FOLLOW)(
+        *memory.blocks(), *tables, looks, *made, int(whole), int(sides)
+    )
     return made
 
 

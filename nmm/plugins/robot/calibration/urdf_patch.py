@@ -15,6 +15,7 @@ from nmm.model.robots.loading.measured_joints import ROUNDED
 from nmm.model.robots.numbers import with_numbers
 from nmm.model.robots.robot import Robot
 from nmm.model.robots.wheel import Wheel
+from nmm.plugins.robot.calibration.arm_patch import Nodes, arm_numbers, number_text, unsaid, write_arm
 from nmm.plugins.robot.calibration.text_edits import Node, XmlText
 
 #: Lengths that differ by less are one, m: of a radius and the height of the wheel's centre, and of moves.
@@ -28,12 +29,17 @@ class UrdfPatch:
 
     robot : as the file has it; values : all its numbers that the file is to have; content : the file's
     left : by number, why the file cannot have it
+    written : the arm's numbers that joints' origins and axes have then
+    changed : the robot that the file is to be of, but for what is left
     """
 
     def __init__(self, robot: Robot, values: Mapping[str, float], content: bytes) -> None:
-        self.robot, self.changed = robot, with_numbers(robot, values)
         self.text = XmlText(content)
-        self.left: dict[str, str] = {}
+        self.nodes, of = Nodes(robot, self.text), arm_numbers(robot, values)
+        self.left = unsaid(robot, values, of, self.nodes)
+        values = {name: value for name, value in values.items() if name not in self.left}
+        self.written = tuple(name for name in of if name in values)
+        self.robot, self.changed = robot, with_numbers(robot, values)
         self._file_names = {new: old for old, new in robot.renamed.items()}
         self._joints = {node.attributes.get("name", ""): node for node in self.text.root.every("joint")}
         self._links = {node.attributes.get("name", ""): node for node in self.text.root.every("link")}
@@ -45,6 +51,8 @@ class UrdfPatch:
         self._move_joints()
         for name, by in self._moves.items():
             self._write_move(self._joints[name], by)
+        if self.written:
+            write_arm(self.text, self.nodes, robot, self.changed)
 
     def _node(self, joint: str) -> Node | None:
         return self._joints.get(self._file_names.get(joint, joint))
@@ -77,7 +85,7 @@ class UrdfPatch:
             as_high = abs(float(place.translation[2]) - wheel.radius) <= SAME
             found = list(self._round_shapes(wheel))
             for shape in found:
-                self.text.write(shape, "radius", _number(new.radius))
+                self.text.write(shape, "radius", number_text(new.radius))
             if not found and not (as_high and self._shapeless(wheel)):
                 why = "no cylinder, sphere or capsule of the wheel has this radius: a mesh has it"
                 self.left[f"radius.{wheel.joint}"] = why
@@ -120,7 +128,10 @@ class UrdfPatch:
     def _move_joints(self) -> None:
         """Joints that steer, hitch or swivel."""
         before, after = self.robot.display_model, self.changed.display_model
+        arm = {*self.robot.q_names[self.robot.platform.n_p :]}
         for joint in range(1, before.njoints):
+            if before.names[joint] in arm:
+                continue
             by = after.jointPlacements[joint].translation - before.jointPlacements[joint].translation
             self._add(str(before.names[joint]), int(before.parents[joint]), np.array(by))
 
@@ -128,11 +139,11 @@ class UrdfPatch:
         origin = joint.first("origin")
         moved = {i: float(by[i]) for i in range(3) if abs(by[i]) > SAME}
         if origin is None:
-            xyz = " ".join(_number(moved.get(i, 0.0)) for i in range(3))
+            xyz = " ".join(number_text(moved.get(i, 0.0)) for i in range(3))
             self.text.insert(joint, f'<origin xyz="{xyz}"/>')
             return
         before = [float(text) for text in origin.attributes.get("xyz", "0 0 0").split()]
-        self.text.write_parts(origin, "xyz", {i: _number(before[i] + way) for i, way in moved.items()})
+        self.text.write_parts(origin, "xyz", {i: number_text(before[i] + way) for i, way in moved.items()})
 
 
 def _end(joint: Node, tag: str) -> str:
@@ -145,9 +156,3 @@ def _is_number(text: str) -> bool:
         return math.isfinite(float(text))
     except ValueError:
         return False
-
-
-def _number(value: float) -> str:
-    """To a nanometre, without zeros at its end."""
-    text = f"{value:.9f}".rstrip("0").rstrip(".")
-    return "0" if text in ("-0", "") else text

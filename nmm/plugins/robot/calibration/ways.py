@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -67,9 +66,8 @@ def _ways(found: Calibration, k: int, values: Array) -> list[Array]:
 
 def _dense(found: Calibration, drive: RobotDrive, values: Array) -> Array:
     """Motions (M, 3) of a drive between many times, by these numbers."""
-    model, at = copy.copy(found.model), np.linspace(drive.at[0], drive.at[-1], DENSE)
-    model.drives = [replace(drive, at=at)]
-    return model.stretched(values, [])[0][0].motions
+    at = np.linspace(drive.at[0], drive.at[-1], DENSE)
+    return found.model.of([replace(drive, at=at)]).stretched(values, [])[0][0].motions
 
 
 def _moved(pose: Array, motion: Array) -> Array:

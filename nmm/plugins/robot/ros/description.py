@@ -27,8 +27,8 @@ def description(
 ) -> tuple[str, list[str]]:
     """The text: links, joints with limits and mimics, what is drawn; and the names of shapes that URDF has no
     words for. Joints turn as in the robot's files, so that their names and signs are those of JointStates; of
-    those that are corrected (`nmm.with_numbers`) URDF has words for the offset, not for a ratio. A mesh's
-    `address` is given its file; by default it is `by_package`."""
+    those that are corrected (`nmm.with_numbers`) URDF has words for the offset and for a ratio of -1, not for
+    others: their signs alone count. A mesh's `address` is given its file; by default it is `by_package`."""
     root, left_out = Element("robot", name=robot.name), []
     written = {name: SubElement(root, "link", name=name) for name in links.links}
     address = address or by_package(robot)
@@ -81,8 +81,8 @@ def _write_joint(root: Element, robot: Robot, link: Link, place: Array) -> None:
     model, (factor, offset) = robot.display_model, robot.gear(link.joint)
     sign = math.copysign(1.0, factor)
     joint = SubElement(root, "joint", name=link.joint, type="fixed")
-    if offset:  # what an encoder reads there is 0 at the offset
-        place = place @ pin.SE3(pin.exp3(offset * joint_screw(model, link.on)[1]), np.zeros(3)).homogeneous
+    if link.moves and offset:  # what an encoder reads there is 0 at the offset
+        place = place @ pin.exp6(offset * pin.Motion(*joint_screw(model, link.on))).homogeneous
     _write_origin(joint, place)
     SubElement(joint, "parent", link=link.parent)
     SubElement(joint, "child", link=link.name)
@@ -106,8 +106,10 @@ def _write_joint(root: Element, robot: Robot, link: Link, place: Array) -> None:
         limit.attrib |= {"lower": _number(ends[0]), "upper": _number(ends[1])}
     for mimic in robot.mimic_joints:
         if mimic.joint == link.joint:
-            mimic = mimic.reversed(robot.reversed_joints)
-            numbers = {"multiplier": _number(mimic.multiplier), "offset": _number(mimic.offset)}
+            multiplier, ahead = robot.gear(mimic.leader)  # the leader's value is what its encoder reads
+            multiplier *= mimic.multiplier / factor
+            ahead = (mimic.value(ahead) - offset) / factor
+            numbers = {"multiplier": _number(multiplier), "offset": _number(ahead)}
             SubElement(joint, "mimic", {"joint": mimic.leader, **numbers})
 
 

@@ -174,11 +174,14 @@ class Messages:
 
     def joint_trajectory(self, t: ArrayLike, q: ArrayLike, q_dot: ArrayLike | None = None) -> Any:
         """A JointTrajectory of the arm along q (N, n) at times t (N,), s, from the first of them on, with its
-        rates where given: the platform's own joints and mimic joints are left out."""
+        rates where given: the platform's own joints and mimic joints are left out. Positions and rates are
+        what the joints' encoders read then (`Robot.reading`), as their drivers take them."""
         robot, times = self.robot, vector(t, None, "t")
         columns, count = robot.arm_coordinates, len(times)
-        rows = matrix(q, (count, robot.n), "q")[:, columns]
-        rates = None if q_dot is None else matrix(q_dot, (count, robot.n), "q_dot")[:, columns]
+        names = [robot.q_names[i] for i in columns]
+        factors, offsets = np.array([robot.gear(name) for name in names]).reshape(-1, 2).T
+        rows = (matrix(q, (count, robot.n), "q")[:, columns] - offsets) / factors
+        rates = None if q_dot is None else matrix(q_dot, (count, robot.n), "q_dot")[:, columns] / factors
         points = [
             self._made(
                 "trajectory_msgs/msg/JointTrajectoryPoint",
@@ -193,7 +196,7 @@ class Messages:
         return self._made(
             "trajectory_msgs/msg/JointTrajectory",
             header=self._header(0.0, ""),
-            joint_names=[robot.q_names[i] for i in columns],
+            joint_names=names,
             points=points,
         )
 

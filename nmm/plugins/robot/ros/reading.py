@@ -257,7 +257,8 @@ def inputs(robot: Robot, q: ArrayLike, velocity: ArrayLike, joint_rates: Mapping
 
 
 def joint_trajectory(message: Any) -> tuple[Array, dict[str, Array]]:
-    """Times (N,), s from its start, and positions (N,) by joint, rad or m, of a JointTrajectory.
+    """Times (N,), s from its start, and positions (N,) by joint, rad or m, of a JointTrajectory: what the
+    joints' encoders read then, so that of a robot with corrections `Robot.q_from` makes coordinates of them.
 
     Raises
     ------
