@@ -134,10 +134,13 @@ from .plugins.planning.planner import Planner as Planner
 from .plugins.planning.planner import plan as plan
 from .plugins.planning.replan import replan as replan
 from .plugins.robot import ros as ros
+from .plugins.robot.calibration.arm.calibration import ArmCalibration as ArmCalibration
+from .plugins.robot.calibration.arm.intrinsics import CameraIntrinsics as CameraIntrinsics
+from .plugins.robot.calibration.arm.sightings import Sightings as Sightings
 from .plugins.robot.calibration.calibration import Calibration as Calibration
-from .plugins.robot.calibration.calibration import LearnedNumber as LearnedNumber
 from .plugins.robot.calibration.calibration import calibrate as calibrate
 from .plugins.robot.calibration.drive_log import DriveLog as DriveLog
+from .plugins.robot.calibration.parameters import LearnedNumber as LearnedNumber
 from .plugins.robot.calibration.patch import DescriptionPatch as DescriptionPatch
 from .plugins.robot.calibration.patch import description_patch as description_patch
 from .plugins.robot.calibration.umbmark import UMBmark as UMBmark

@@ -34,7 +34,7 @@ class Follow:
         u = self.loop.step(t, self.q, self.measured)
         q = self.robot.rest if self.q is None else self.q
         ahead = q + self.dt * self.robot.S(q) @ u  # a car's steering is to be there by then
-        p = self.robot.platform.p
-        return self.messages.twist(ahead, u), dict(
-            zip(self.robot.u_names[p:], map(float, u[p:]), strict=True)
-        )
+        p, gear = self.robot.platform.p, self.robot.gear
+        arm = zip(self.robot.u_names[p:], map(float, u[p:]), strict=True)
+        rates = {joint: rate / gear(joint)[0] for joint, rate in arm}  # as its encoder counts
+        return self.messages.twist(ahead, u), rates

@@ -109,6 +109,8 @@ IN_THE_PLACE = {"Distances", "Recorder", "Definition"}
 ABOVE_THE_WALL = {
     "HeldOut",
     "DriveNoise",
+    "ArmHeldOut",
+    "SightingNoise",
     "Awaited",
     "Plant",
     "RunCamera",

@@ -36,6 +36,8 @@ EXCEPTIONS = {
         for name in ("boolean", "float64", "int64", "void")
     },
     ("nmm.base.kernels", "records"): "the kernels' records, as a module, traced with symbols",
+    ("nmm.model.collisions.elements.cell_mesh", "cell_triangles"): "another process draws what was sensed",
+    ("nmm.model.collisions.elements.boxes", "Elements"): "another process draws what was sensed",
     ("nmm.model.collisions.pairs", "measured_pairs"): "a scenario's draft leaves out pairs that touch",
     ("nmm.model.collisions.pairs", "random_configurations"): "a scenario's draft leaves out pairs that touch",
     ("nmm.model.collisions.pairs", "HULLS"): "a scenario's draft leaves out pairs that touch",
