@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -109,13 +108,7 @@ class Calibration:
             if name not in of_robot
         }
         measured["noise"] = self.noise._asdict()
-        if self.held_out is not None:
-            known = {name: x for name, x in self.held_out._asdict().items() if not math.isnan(x)}
-            measured["held_out"] = known | {"verdict": self.held_out.verdict}
-        if not math.isnan(self.whiteness):
-            measured["whiteness"] = self.whiteness
-        measured["findings"] = [str(finding) for finding in self.findings]
-        return file_of(self.robot, own, self.numbers, measured, self.logs)
+        return file_of(self.robot, own, self.numbers, measured, self)
 
     def save(self, path: str | Path) -> None:
         """Write calibration.yaml, which `nmm.load(file, calibration=path)` takes."""

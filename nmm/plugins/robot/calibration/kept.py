@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+import math
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from nmm.base.arrays import scalar
@@ -32,14 +33,27 @@ def names(asked: Collection[str], where: str, expected: str = "a name, or severa
     return tuple(several)
 
 
+def known(of: Any) -> dict[str, Any]:
+    """A named tuple as a mapping, without what is not known."""
+    return {name: x for name, x in of._asdict().items() if not (isinstance(x, float) and math.isnan(x))}
+
+
 def file_of(
     robot: Robot,
     own: Mapping[str, float],
     numbers: Mapping[str, LearnedNumber],
-    measured: Mapping[str, Any],
-    logs: Sequence[str],
+    measured: dict[str, Any],
+    calibration: Any,
 ) -> CalibrationFile:
-    """The file of what was learned of a robot, with the numbers that it had from an earlier calibration."""
+    """The file of what was learned of a robot, with the numbers that it had from an earlier calibration.
+
+    calibration : whose `held_out`, `whiteness` and `findings` go beside what was `measured`
+    """
+    if calibration.held_out is not None:
+        measured["held_out"] = known(calibration.held_out) | {"verdict": calibration.held_out.verdict}
+    if not math.isnan(calibration.whiteness):
+        measured["whiteness"] = calibration.whiteness
+    measured["findings"] = [str(finding) for finding in calibration.findings]
     kept = {name: value for name, value in robot.changed_numbers.items() if name not in own}
     deviations = {name: numbers[name].deviation for name in own}
-    return CalibrationFile.of(robot, {**kept, **own}, deviations, measured=measured, logs=logs)
+    return CalibrationFile.of(robot, {**kept, **own}, deviations, measured=measured, logs=calibration.logs)

@@ -24,7 +24,7 @@ from nmm.plugins.robot.calibration.arm.model import RATIO, ArmModel
 from nmm.plugins.robot.calibration.arm.own_frames import check_frames
 from nmm.plugins.robot.calibration.arm.residuals import PIXEL, PLACE, TURN
 from nmm.plugins.robot.calibration.arm.sightings import Sightings, named_apart
-from nmm.plugins.robot.calibration.kept import Hold, file_of, holding, names
+from nmm.plugins.robot.calibration.kept import Hold, file_of, holding, known, names
 from nmm.plugins.robot.calibration.parameters import LearnedNumber
 from nmm.scenario.calibration_file import CalibrationFile
 
@@ -105,13 +105,8 @@ class ArmCalibration:
             for name, number in self.numbers.items()
             if name not in own and number.why in ("learned", "held", "not shown") and self.is_mount(name)
         }
-        measured["noise"] = {log: _known(noise) for log, noise in self.noise.items()}
-        if self.held_out is not None:
-            measured["held_out"] = _known(self.held_out) | {"verdict": self.held_out.verdict}
-        if not math.isnan(self.whiteness):
-            measured["whiteness"] = self.whiteness
-        measured["findings"] = [str(finding) for finding in self.findings]
-        return file_of(self.robot, own, self.numbers, measured, self.logs)
+        measured["noise"] = {log: known(noise) for log, noise in self.noise.items()}
+        return file_of(self.robot, own, self.numbers, measured, self)
 
     def save(self, path: str | Path) -> None:
         """Write calibration.yaml, which `nmm.load(file, calibration=path)` takes."""
@@ -215,7 +210,3 @@ def _numbers(model: ArmModel, fitted: ArmFit, held: Mapping[int, float]) -> dict
             before = model.robot.gear(joint)[0]
             numbers[RATIO + joint] = LearnedNumber(before, -before, 0.0, "1", "sign")
     return numbers
-
-
-def _known(of: Any) -> dict[str, Any]:
-    return {name: x for name, x in of._asdict().items() if not (isinstance(x, float) and math.isnan(x))}

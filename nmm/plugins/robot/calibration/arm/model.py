@@ -135,7 +135,7 @@ class ArmModel:
         """Of a log: placements of the chain, S and T of the mounts (4, 4), and of the target as the sensor
         sees it (N, 4, 4)."""
         moved = view.chain.moved(self._q(view, values), self._origins(view, values))
-        S, T = (self._mounted(blocks, values) for blocks in (view.sensor, view.target))
+        S, T = (self.mounted(blocks, values) for blocks in (view.sensor, view.target))
         return moved, S, T, inverse(moved.by @ S) @ moved.on @ T
 
     def nominal(self, view: SightingsView, values: Array) -> Array:
@@ -253,7 +253,8 @@ class ArmModel:
             parts[PARTS.index(part)] = values[i]
         return parts
 
-    def _mounted(self, blocks: Sequence[Block], values: Array) -> Array:
+    def mounted(self, blocks: Sequence[Block], values: Array) -> Array:
+        """Where blocks put what is behind them, (4, 4)."""
         made = np.eye(4)
         for block in blocks:
             made = made @ placed(self._parts(block, values), self.turns.get(block.name))

@@ -12,7 +12,7 @@ from nmm.model.robots.origins import PARTS
 from nmm.plugins.robot.calibration.arm.causes import expected_instead
 from nmm.plugins.robot.calibration.arm.guess import TRIES, board_poses, first_mounts
 from nmm.plugins.robot.calibration.arm.model import ArmModel
-from nmm.plugins.robot.calibration.arm.placements import inverse, parts_of, placed
+from nmm.plugins.robot.calibration.arm.placements import inverse, parts_of
 from nmm.plugins.robot.calibration.arm.residuals import PLACE, TURN
 from nmm.plugins.robot.calibration.arm.sightings import WORLD
 from nmm.plugins.robot.calibration.arm.solving import robust
@@ -64,7 +64,7 @@ def with_mounts(
         ]
         if view.log.kind == "points" and not view.target[-1].numbers:
             continue
-        mounted = [_mounted(model, side, values) for side in (view.sensor, view.target)]
+        mounted = [model.mounted(side, values) for side in (view.sensor, view.target)]
         S, T = (None if some else at for some, at in zip(free, mounted, strict=True))
         result = first_mounts(view.log, model.nominal(view, values), seen, S, T, tries)
         if result is None:
@@ -74,27 +74,13 @@ def with_mounts(
     return values
 
 
-def _mounted(model: ArmModel, side: Sequence[Block], values: Array) -> Array:
-    made = np.eye(4)
-    for block in side:
-        made = made @ _at(model, block, values)
-    return made
-
-
-def _at(model: ArmModel, block: Block, values: Array) -> Array:
-    parts = np.zeros(6)
-    for part, i in block.numbers.items():
-        parts[PARTS.index(part)] = values[i]
-    return placed(parts, model.turns.get(block.name))
-
-
 def _put(model: ArmModel, side: Sequence[Block], at: Array, values: Array, known: set[int]) -> None:
     """Give the last block of a side that is not known what makes the side stand there."""
     free = [k for k, block in enumerate(side) if any(i not in known for i in block.numbers.values())]
     if not free:
         return
     k = free[-1]
-    ahead, behind = (_mounted(model, blocks, values) for blocks in (side[:k], side[k + 1 :]))
+    ahead, behind = (model.mounted(blocks, values) for blocks in (side[:k], side[k + 1 :]))
     own, block = inverse(ahead) @ at @ inverse(behind), side[k]
     whole = len(block.numbers) == 6 and not any(i in known for i in block.numbers.values())
     parts = parts_of(own)
