@@ -43,18 +43,22 @@
     tick();
   }
 
+  // What is held while another part or other axes are chosen has to be let go of once. Where nothing is held, J may follow
+  // before the next look.
+  const lock = () => (locked ||= devices.read().held);
+
   function choose(part) {
     if (part === jog.part || !(part === "base" ? jog.base : jog.hands).length) return;
     if (jog.moves) say(ZERO);
     Object.assign(jog, { part, moves: false });
-    locked = true;
+    lock();
     name();
   }
   function turn(frame) {
     const all = Object.keys(WHOSE);
     if (jog.moves) say(ZERO);
     Object.assign(jog, { frame: frame || all[(all.indexOf(jog.frame) + 1) % all.length], moves: false });
-    locked = true;
+    lock();
     name();
   }
 
