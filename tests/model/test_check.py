@@ -9,12 +9,11 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 import pytest
 import trimesh
 from command_line import Result
 from findings import assert_found, holds, of_code
-from urdf_parts import AXIS, LIMIT, inertial, joint, link, robot, shape, write
+from urdf_parts import AXIS, inertial, joint, link, robot, shape, write
 
 import nmm
 from nmm import Finding
@@ -30,7 +29,6 @@ pytestmark = pytest.mark.usefixtures("xacro_each_time")
 Command = Callable[..., Result]
 TIAGO = "robots/tiago_description/robots/tiago_no_hand.urdf"
 XACRO = 'name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"'
-ACROSS = '<axis xyz="0 1 0"/>'
 HEAVY_LINKS = link("a", inertial()) + link("b", inertial())
 
 
@@ -637,26 +635,3 @@ def test_a_report_says_what_was_used(tmp_path: Path) -> None:
     assert made.expanded
     assert "d=0.5" in made.facts["xacro arguments"]
     assert made.text.startswith("<?xml")
-
-
-def test_pairs_that_are_far_apart_are_not_looked_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of a chain of 71 links, whose 2,415 pairs touch as often as where all are looked at, but where two just
-    touch."""
-    box = inertial() + shape('<box size="0.12 0.12 0.12"/>', "collision")
-    at = '<origin xyz="0.1 0 0.02"/>'
-    chain = [
-        joint(f"j{i}", f"l{i}", f"l{i + 1}", "revolute", (AXIS, ACROSS)[i % 2] + LIMIT, at) for i in range(70)
-    ]
-    boxes = [link(f"l{i}", box) for i in range(71)]
-    made = nmm.load(write(tmp_path / "chain.urdf", robot(*boxes, *chain)), platform="fixed")
-    asked: list[int] = []
-    through = pin.computeCollision
-    monkeypatch.setattr(pin, "computeCollision", lambda *given: asked.append(1) or through(*given))
-    near = touching_links(made, 50)
-    assert len(asked) < 0.2 * 50 * len(near.shares)
-    monkeypatch.setattr("nmm.model.collisions.pairs.FEW_PAIRS", 10_000)
-    whole = touching_links(made, 50)
-    assert len(whole.shares) > 2_000
-    differ = [pair for pair, share in whole.shares.items() if abs(share - near.shares[pair]) > 0.021]
-    assert differ == []
-    assert len(whole.sometimes) > 50

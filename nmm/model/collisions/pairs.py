@@ -279,15 +279,19 @@ class NearPairs:
             body.computeLocalAABB()
         self._middles = np.array([body.aabb_center for body in bodies])
         radii = np.array([body.aabb_radius for body in bodies])
-        self._first, self._second = pairs.T
-        self._reach = radii[self._first] + radii[self._second]
+        self._reach = np.square(np.add.outer(radii, radii))
+        self._number = np.full(self._reach.shape, -1)
+        self._number[tuple(pairs.T)] = np.arange(len(pairs))
 
     def at(self, data: pin.GeometryData) -> list[int]:
         """Their numbers where the shapes are now."""
-        middles = np.array([place.act(middle) for place, middle in zip(data.oMg, self._middles, strict=True)])
-        apart = np.linalg.norm(middles[self._first] - middles[self._second], axis=1)
+        rows = placement_rows(data.oMg)
+        axes = rows[:, :9].reshape(-1, 3, 3)
+        middles = rows[:, 9:] + np.einsum("kji,kj->ki", axes, self._middles)
+        apart = np.sum([np.square(np.subtract.outer(along, along)) for along in middles.T], axis=0)
         # What is infinite has no middle, and is near everything.
-        return np.flatnonzero(~(apart > self._reach)).tolist()
+        near = self._number[~(apart > self._reach)]
+        return near[near >= 0].tolist()
 
 
 def touching_links(robot: Robot, count: int = CONFIGURATIONS) -> Touching:

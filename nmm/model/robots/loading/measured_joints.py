@@ -81,10 +81,14 @@ class Measured:
 
     @cached_property
     def placements(self) -> list[pin.SE3]:
-        data = self.model.createData()
-        pin.forwardKinematics(self.model, data, self.neutral)
-        root = data.oMi[self.root].inverse()
-        return [root * placement for placement in data.oMi]
+        # Joint by joint: data of a model of 190 joints, with its Hessians, take a third of a second to make.
+        model, found = self.model, [pin.SE3.Identity()]
+        for i, joint in enumerate(model.joints[1:], start=1):
+            data = joint.createData()
+            joint.calc(data, self.neutral)
+            found.append(found[model.parents[i]] * model.jointPlacements[i] * data.M)
+        root = found[self.root].inverse()
+        return [root * placement for placement in found]
 
     @cached_property
     def joints(self) -> dict[str, int]:
