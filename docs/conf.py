@@ -9,6 +9,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE / "building")]
 
 from docstrings import as_rst, signature_that_helps
+from figures import told_from_others
 from formulas import block, inline
 from frames import copy_frames, without_missing_frames
 from keyboards import for_keyboards
@@ -62,6 +63,7 @@ def setup(app: Any) -> None:
     app.connect("autodoc-process-docstring", lambda *given: as_rst(given[-1]))
     app.connect("autodoc-process-signature", signature_that_helps)
     app.connect("missing-reference", short_name)
+    app.connect("doctree-resolved", told_from_others)
     app.connect("html-page-context", without_missing_frames, priority=900)
     app.connect("html-page-context", for_keyboards, priority=900)
     app.connect("build-finished", copy_frames)

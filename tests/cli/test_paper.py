@@ -9,9 +9,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
+from grounds import grounds
 from page_links import Links
 from playback_browser import browser as browser
 from playwright.sync_api import Browser
@@ -135,6 +137,23 @@ def test_page_opens_in_a_browser(whole_paper: PaperReport, browser: Browser) -> 
         assert page.evaluate("document.documentElement.scrollWidth") == width
     page.close()
     assert wrong == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_figures_ground_is_the_pages(
+    paper: tuple[PaperReport, list[float]], browser: Browser, scheme: Literal["light", "dark"]
+) -> None:
+    """In the dark it was a grey box. What is drawn can be seen."""
+    page = browser.new_page(color_scheme=scheme, viewport={"width": 820, "height": 900})
+    page.goto(paper[0].index.as_uri(), wait_until="load")
+    figures = page.locator("figure img[src^='fig']").all()
+    assert len(figures) == 8
+    for figure in figures:
+        ground, own, most = grounds(figure)
+        assert bool(ground.mean() < 60) == (scheme == "dark")
+        np.testing.assert_allclose(own, np.broadcast_to(ground, own.shape), atol=2)
+        assert most > 150
+    page.close()
 
 
 def result(number: int, found: str = "so") -> CaseResult:

@@ -6,7 +6,9 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
+from grounds import grounds
 from playback_browser import Window
 from playback_browser import browser as browser
 from playback_browser import empty_page as empty_page
@@ -58,6 +60,28 @@ def test_light_and_dark(address: str, window: Window) -> None:
     assert grounds["light"] != grounds["dark"]
     page.click(".theme-toggle-content button")
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") == grounds["light"]
+    page.evaluate("localStorage.clear()")
+    page.emulate_media(color_scheme="null")
+
+
+@pytest.mark.parametrize("chosen", ["light", "dark", "dark by a button"])
+@pytest.mark.parametrize(("name", "file"), [("contents", "overview.png"), ("platforms", "car.svg")])
+def test_a_figures_ground_is_the_pages(
+    address: str, window: Window, name: str, file: str, chosen: str
+) -> None:
+    """Which in the dark it was not; what is drawn can be seen, and pictures of scenes are as they are."""
+    page = window.page
+    page.set_viewport_size({"width": 820, "height": 900})
+    page.emulate_media(color_scheme="dark" if chosen == "dark" else "light")
+    window.open(f"{address}/{name}.html")
+    while "button" in chosen and page.evaluate("document.body.dataset.theme") != "dark":
+        page.click(".theme-toggle-header button")
+    ground, own, most = grounds(page.locator(f"img[src$='/{file}']"))
+    assert bool(ground.mean() < 60) == chosen.startswith("dark")
+    np.testing.assert_allclose(own, np.broadcast_to(ground, own.shape), atol=3)
+    assert most > 100
+    assert page.evaluate("""[...document.images].filter(({ src }) => src.endsWith("playback.png"))
+      .every((scene) => getComputedStyle(scene).filter === "none")""")
     page.evaluate("localStorage.clear()")
     page.emulate_media(color_scheme="null")
 

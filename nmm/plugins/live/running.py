@@ -123,8 +123,8 @@ class LiveRun(RobotSession):
         self._picture = Picture(1, 0, [], BEGINS)
         look = looks_of_labels([controller.resolver.name.upper()])[0]
         running = Drawing()
-        path, desired = self._growing.drawn
-        running.add("running", duration=self._end, path=path, desired=desired, color=list(look.rgb))
+        frame, desired = self._growing.drawn
+        running.add("running", duration=self._end, frame=frame, desired=desired, color=list(look.rgb))
         collisions, start = controller.given.collisions, robot.following.placed(robot.q(q0))
         super().__init__(
             RolledRobot(robot, start),
@@ -287,7 +287,7 @@ class LiveRun(RobotSession):
 class Growing:
     """What a page plots of a run while it is recorded; tasks that come and go have NaN rows while inactive.
     `channels` have no values; `partitions` names RG's partitions by number, as they come; `drawn` tells
-    whether a frame's path is drawn, and whether its desired one."""
+    the frame whose path is drawn, or None, and whether its desired one is."""
 
     def __init__(self, controller: Controller) -> None:
         self._robot = robot = controller.robot
@@ -298,7 +298,7 @@ class Growing:
         self._shown = shown_frame(tasks.stack, robot)
         self._seen = SeenPoints(tasks.stack, controller.limits, robot)
         self._path = None if self._shown.frame is None else FramePath(robot, self._shown.frame)
-        self.drawn = self._path is not None, self._path is not None and bool(self._shown.rows)
+        self.drawn = self._shown.frame, self._path is not None and bool(self._shown.rows)
         self.partitions: list[str] = []
         self._numbers: dict[tuple[int, ...], int] = {}
         names = [row.name for row in rows] if self._schedule is None else row_names(self._schedule)

@@ -142,7 +142,7 @@ def playback_scene(
                 _line(drawing, f"{path}/{name}", color, points[drawn], motion.t[drawn] - start, thick)
         planned = None if motion.planned is None else _on_the_floor(motion.robot, motion.planned, size)
         if planned is not None:
-            _line(drawing, f"{path}/plan", DESIRED, planned[drawn], thick=0.6)
+            _line(drawing, f"{path}/plan", DESIRED, planned[drawn], thick=0.6, text="plan")
         animations += draw_cameras(drawing, motion, robot, path, start, fps, size)
         if motion.believed is not None:
             believed = replace(motion, q=motion.believed, path=None)
@@ -296,16 +296,23 @@ def _desired(drawing: Drawing, motions: Sequence[Motion]) -> None:
         if path is None or any(path.shape == other.shape and np.allclose(path, other) for other in seen):
             continue
         samples = np.unique(np.linspace(0, len(path) - 1, MOST_FRAMES).astype(int))
-        _line(drawing, f"/nmm/desired {len(seen)}", DESIRED, path[samples])
+        _line(drawing, f"/nmm/desired {len(seen)}", DESIRED, path[samples], text="desired path")
         seen.append(path)
 
 
 def _line(
-    drawing: Drawing, path: str, color: Rgb, points: Array, t: Array | None = None, thick: float = 1.0
+    drawing: Drawing,
+    path: str,
+    color: Rgb,
+    points: Array,
+    t: Array | None = None,
+    thick: float = 1.0,
+    text: str = "",
 ) -> None:
-    """A path through points (K, 3), m, which grows over times (K,) if given."""
+    """A path through points (K, 3), m, which grows over times (K,) if given; else it is dashed, and the
+    legend calls it `text`."""
     line, times = packed(points, np.float32), None if t is None else packed(t, np.float64)
-    drawing.add("path", path=path, color=list(color), points=line, times=times, thick=thick)
+    drawing.add("path", path=path, color=list(color), points=line, times=times, thick=thick, text=text)
 
 
 def _targets(drawing: Drawing, motions: Sequence[Motion], size: float) -> None:

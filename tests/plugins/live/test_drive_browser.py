@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from driven_pages import driven, opened
+from legend_rows import lines_with_rows
 from playback_browser import UPRIGHT, WALK, Window, draw_frames, watched
 from playback_browser import browser as browser
 from playback_browser import empty_page as empty_page
@@ -395,10 +396,11 @@ def test_n_plans_round_a_wall_and_the_page_shows_how(window: Window) -> None:
         points = points.reshape(-1, 2, 3)
         assert len(points) > 2
         assert np.linalg.norm(np.diff(points, axis=1), axis=-1).max() <= 2.0 + 1e-6  # a step: 2 s, 1 m/s
-        key = page.get_by_role("button", name="search tree")
+        key = page.locator("#legend button", has_text="search tree")  # not seen in a low window
         for shown in (False, True):
-            key.click()
+            key.dispatch_event("click")
             assert page.evaluate(f"{tree}.visible") is shown
+        assert lines_with_rows(page) == ["ground", "plan/0", "plan/1", "plan/tree", "trail 0"]
         button = page.get_by_role("button", name="Plan", exact=True)
         page.wait_for_function("document.getElementById('plan').ariaPressed === 'true'")
         began = np.array(page.evaluate("nmm.drive.targets[0].at"))

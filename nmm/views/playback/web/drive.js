@@ -180,7 +180,7 @@
     line.frustumCulled = false;
     const path = `/nmm/trail ${number}`;
     nmm.viewer.set_object(nmm.split(path), line);
-    nmm.legend({ kind: "line", color: TRAIL, text: `the last ${KEPT} s of ${frame}`, path });
+    nmm.legend({ kind: "line", color: TRAIL, text: `the last ${KEPT} s of ${frame}`, path, aside: true });
     return { geometry, points: [], most };
   }
   function extend({ trail: line, at }) {
@@ -230,7 +230,7 @@
       drive.grown = on;
       if (drive.tree) nmm.node("/nmm/plan/tree").visible = on;
     };
-    parts.grown = nmm.legend({ kind: "line", color: GROWN, text: "search tree", act });
+    parts.grown = nmm.legend({ kind: "line", color: GROWN, text: "search tree", act, aside: true });
   }
 
   // The plan that it follows: its ways, dashed, the tree it comes of, and copies of the robot along it.

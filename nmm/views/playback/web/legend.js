@@ -24,12 +24,13 @@
     return sign;
   };
 
-  // path: a node that the entry shows and hides, or several; act(on): what it does instead.
-  nmm.legend = ({ kind, color, text, path, act }) => {
+  // path: a node that the entry shows and hides, or several; act(on): what it does instead; aside: whether a low window
+  // leaves it out.
+  nmm.legend = ({ kind, color, text, path, act, aside = path === undefined && act === undefined }) => {
     const fixed = path === undefined && act === undefined;
     if (fixed && text && [...list.children].some((item) => item.textContent === text)) return undefined;
     const item = document.createElement("li");
-    item.classList.toggle("fixed", fixed);
+    item.classList.toggle("aside", aside);
     const holder = fixed ? item : item.appendChild(document.createElement("button"));
     holder.append(nmm.sign(kind, color), text);
     if (!fixed) {

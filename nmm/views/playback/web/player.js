@@ -29,8 +29,10 @@
   nmm.hooks.target = ({ color }) => nmm.legend({ kind: "ball", color, text: "target" });
 
   nmm.hooks.ready = () => {
-    if (nmm.scenery.thin) nmm.legend({ kind: "thin", color: [0.5, 0.55, 0.62], text: "platform's path" });
-    nmm.legend({ kind: "grid", color: [0.5, 0.55, 0.62], text: `grid of ${nmm.scenery.pitch} m` });
+    const grey = [0.5, 0.55, 0.62];
+    const color = nmm.motions.length === 1 ? nmm.motions[0].color : grey;
+    if (nmm.scenery.thin) nmm.legend({ kind: "thin", color, text: "platform's path" });
+    nmm.legend({ kind: "grid", color: grey, text: `grid of ${nmm.scenery.pitch} m` });
     const animator = nmm.viewer.animator;
     animator.play(); // MeshCat seeks only once its actions have been started
     animator.pause();

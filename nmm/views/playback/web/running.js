@@ -9,7 +9,7 @@
   const lines = [];
   let [keys, shown, redrawn] = [[], 0, 0];
 
-  nmm.hooks.running = ({ duration, path, desired, color }) => {
+  nmm.hooks.running = ({ duration, frame, desired, color }) => {
     document.body.classList.add("running");
     // The clock is the program's: nobody seeks.
     nmm.player.seek = () => {};
@@ -21,8 +21,8 @@
     for (const key of keys) run.columns[key].values = [];
     nmm.stage.duration = duration;
     nmm.player.range = { from: 0, to: duration };
-    if (path) lines.push(line("driven", color));
-    if (desired) lines.push(line("desired", [0.16, 0.18, 0.22]));
+    if (frame !== null) lines.push(line("driven", color, `path of ${frame}`));
+    if (desired) lines.push(line("desired", [0.16, 0.18, 0.22], "desired path"));
     nmm.scenery.paths = lines.map(({ object }) => object);
     nmm.plots.show(true);
     nmm.camera.reset();
@@ -30,10 +30,15 @@
   };
 
   // A line that grows, with room for twice as many points whenever it is full.
-  function line(name, color) {
-    const object = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: nmm.color(nmm.theme.paint(color)) }));
+  function line(name, color, text) {
+    const object = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial());
+    const themed = () => object.material.color.copy(nmm.color(nmm.theme.paint(color)));
+    themed();
+    nmm.theme.listeners.push(themed);
     object.frustumCulled = false;
-    nmm.viewer.set_object(nmm.split(`/nmm/running ${name}`), object);
+    const path = `/nmm/running ${name}`;
+    nmm.viewer.set_object(nmm.split(path), object);
+    nmm.legend({ kind: "thin", color, text, path, aside: true });
     return { object, room: 0, points: [] };
   }
   function extend(line) {

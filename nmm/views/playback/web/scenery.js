@@ -264,7 +264,7 @@
   }
 
   // A path without times is dashed; one with times grows as the robot drives it, over a faint whole.
-  nmm.hooks.path = ({ path, color, points, times, thick, text = "desired path" }) => {
+  nmm.hooks.path = ({ path, color, points, times, thick, text }) => {
     const radius = Math.min(0.0032 * nmm.stage.size, nmm.stage.thin) * thick;
     const [kept, when] = thinned(points, times, 0.0048 * nmm.stage.size * thick);
     if (kept.length < 2) return;
