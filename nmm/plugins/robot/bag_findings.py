@@ -20,6 +20,8 @@ WORDS: dict[str, Words] = {
     "{names:plural contradicts|contradict} q}: differences of q are taken",
     "joint_silent": "{name} comes no more after t = {t:.4g} s: it stays where it was until {last:.4g} s",
     "values_not_finite": "{name} is no number in {count:count message}, left out",
+    "looks_lost": "{count:count message} of {topic} without a pose left out: numbers that are none, or a "
+    "quaternion of zeros",
     "child_unnamed": "{topic} does not say whose pose it is: taken for the reference point's",
     "platform_silent": "no pose of the platform from t = {t:.4g} to {end:.4g} s: a straight line in between",
     "platform_unknown": "{s:.4g} s of joint states, in which the platform's pose is not known, are left out",

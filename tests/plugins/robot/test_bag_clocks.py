@@ -404,6 +404,12 @@ WORDS = [
     ),
     ("values_not_finite", {"name": "q1", "count": 5}, {}, "q1 is no number in 5 messages, left out"),
     (
+        "looks_lost",
+        {"topic": "/tf", "count": 1},
+        {},
+        "1 message of /tf without a pose left out: numbers that are none, or a quaternion of zeros",
+    ),
+    (
         "child_unnamed",
         {"topic": "/odom"},
         {},

@@ -16,7 +16,7 @@ from nmm.model.robots.configuration import Configuration
 from nmm.model.robots.robot import Robot
 from nmm.motion.trajectory import Trajectory
 from nmm.motion.verdict import Verdict
-from nmm.plugins.robot.ros.recorded import Names, Recorded
+from nmm.plugins.robot.ros.recorded import Names, Recorded, told_of
 from nmm.plugins.robot.ros.routes import Route, routes
 from nmm.plugins.robot.ros.tracks import by_differences, contradict, settle
 
@@ -81,12 +81,9 @@ def read_bag(
     True
     """
     file = Path(path)
-    topics = (joints,) if isinstance(joints, str) else tuple(joints)
-    names = Names(topics, odometry, tf, map, odom, base, namespace, prefix)
-    try:
+    names = Names(joints, odometry, tf, map, odom, base, namespace, prefix)
+    with told_of(file):
         motion = _RecordedMotion(Recorded(robot, file, names))
-    except InputError as error:
-        raise (error if str(file) in error.where else error.at(file)) from None
     t = (motion.times - motion.times[0]) / 1e9
     for finding in motion.findings:
         warnings.warn(f"{file.name}: {finding}", RuntimeWarning, stacklevel=2)

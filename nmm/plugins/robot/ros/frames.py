@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections import deque
 from collections.abc import Collection
 from dataclasses import dataclass, field
@@ -12,10 +13,12 @@ import numpy as np
 
 from nmm.base.arrays import Array, Integers, vector
 from nmm.base.errors import InputError, expect
+from nmm.base.findings import Finding
 from nmm.model.robots.robot import Robot
 from nmm.plugins.robot.ros.making import base_joint, root_link
-from nmm.plugins.robot.ros.reading import name_of, nanoseconds, placement, plain, planar, velocities
+from nmm.plugins.robot.ros.reading import lost, name_of, placement, placements, plain, planar, velocities
 from nmm.plugins.robot.ros.tracks import Track
+from nmm.plugins.robot.ros.transforms import told_in
 
 #: Poses that differ by less, m and rad, are the same.
 SAME = 1e-6
@@ -158,17 +161,43 @@ class Tree:
 
     def __init__(self) -> None:
         self.edges: dict[tuple[str, str], Edge] = {}
+        self._rows: dict[Edge, array[float]] = {}
+        self._told: dict[tuple[str, str], tuple[Track, array[float]]] = {}
 
     @property
     def frames(self) -> list[str]:
         return sorted({name for pair in self.edges for name in pair})
 
     def add(self, message: Any, topic: str, static: bool, recorded: int) -> None:
-        """Add the transforms of a TFMessage."""
-        for transform in message.transforms:
-            pair = plain(transform.header.frame_id), plain(transform.child_frame_id)
-            edge = self.edges.setdefault(pair, Edge(*pair, static, topic))
-            edge.track.add(nanoseconds(transform), recorded, placement(transform))
+        """Add the transforms of a TFMessage, as numbers until `place` makes poses of them."""
+        for frame, child, stamp, numbers in told_in(message):
+            known = self._told.get((frame, child))
+            if known is None:
+                pair = plain(frame), plain(child)
+                edge = self.edges.setdefault(pair, Edge(*pair, static, topic))
+                known = self._told[frame, child] = edge.track, self._rows.setdefault(edge, array("d"))
+            track, rows = known
+            track.stamps.append(stamp)
+            track.recorded.append(recorded)
+            rows.extend(numbers)
+
+    def place(self) -> list[Finding]:
+        """Make poses of all that was added, and tell what of an edge that is known is without one, and left
+        out; `InputError` as of `placement`."""
+        findings = []
+        for edge, told in self._rows.items():
+            rows, track = np.array(told).reshape(-1, 7), edge.track
+            none = lost(rows)
+            if none.any() and not none.all():
+                rows[none] = rows[np.argmin(none)]
+                findings.append(Finding("looks_lost", {"topic": edge.name, "count": int(none.sum())}))
+            known = len(track.rows)
+            track.rows.extend(placements(rows, edge.name))
+            if none.any():  # all of them were refused above
+                track.without(np.concatenate([np.zeros(known, dtype=bool), none]))
+        self._rows.clear()
+        self._told.clear()
+        return findings
 
     def way(self, frame: str, child: str) -> Way | None:
         """The fewest edges from one frame to another; None where there are none."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.base.arrays import Array, increasing, vector
+from nmm.base.arrays import Array, Flags, increasing, vector
 from nmm.base.errors import InputError, expect
 from nmm.model.robots.robot import Robot
 
@@ -91,19 +91,53 @@ def placement(message: Any) -> Array:
     >>> nmm.ros.placement(pose)[:3, 3], nmm.ros.base(pose).round(3)
     (array([1., 2., 0.]), array([1.   , 2.   , 3.142]))
     """
-    where, part = name_of(message), message
+    numbers = pose_numbers(message)
+    return _placed(numbers[:3], numbers[3:], name_of(message))
+
+
+def pose_numbers(message: Any) -> tuple[float, ...]:
+    """x, y, z, m, and a quaternion x, y, z, w of a message's pose, as they are."""
+    part = message
     while (inner := getattr(part, "pose", None) or getattr(part, "transform", None)) is not None:
         part = inner
     at = getattr(part, "position", None) or getattr(part, "translation", None)
     turn = getattr(part, "orientation", None) or getattr(part, "rotation", None)
     if at is None or turn is None:
-        raise InputError(where=where, expected="a message with a pose or a transform")
-    # One number at a time: arrays of three or four take ten times as long, and logs have 10^5 poses.
-    x, y, z, w = _numbers((turn.x, turn.y, turn.z, turn.w), where, "orientation")
+        raise InputError(where=name_of(message), expected="a message with a pose or a transform")
+    return at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w
+
+
+def lost(rows: Array) -> Flags:
+    """Which rows (N, 3) or (N, 7) of places and quaternions tell nothing: numbers that are none, or a
+    quaternion of zeros, as trackers send them of a target that is hidden."""
+    none = np.isnan(rows).any(axis=1)
+    return np.asarray(none | ~rows[:, 3:].any(axis=1) if rows.shape[1] > 3 else none)
+
+
+def placements(rows: Array, where: str) -> Array:
+    """Poses (N, 4, 4) of rows (N, 7): x, y, z, m, and a quaternion x, y, z, w. Errors as of `placement`."""
+    place, turn = rows[:, :3], rows[:, 3:]
+    lengths = np.linalg.norm(turn, axis=1)
+    with np.errstate(invalid="ignore"):
+        good = (np.abs(lengths - 1.0) <= UNIT) & (np.abs(place) <= FARTHEST).all(axis=1)
+    for k in np.flatnonzero(~good).tolist():  # the next may be worse: by a last bit one is good after all
+        _placed(tuple(place[k].tolist()), tuple(turn[k].tolist()), where)
+    x, y, z, w = turn.T / lengths
+    made = np.zeros((len(rows), 4, 4))
+    made[:, 0, :3] = np.array([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)]).T
+    made[:, 1, :3] = np.array([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)]).T
+    made[:, 2, :3] = np.array([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]).T
+    made[:, :3, 3], made[:, 3, 3] = place, 1.0
+    return made
+
+
+def _placed(at: tuple[float, ...], turn: tuple[float, ...], where: str) -> Array:
+    # One number at a time: arrays of three or four take ten times as long.
+    x, y, z, w = _numbers(turn, where, "orientation")
     length = math.hypot(x, y, z, w)
     expect(abs(length - 1.0) <= UNIT, f"{where}: orientation", "a quaternion of length 1", length)
     x, y, z, w = x / length, y / length, z / length, w / length
-    place = _numbers((at.x, at.y, at.z), where, "position")
+    place = _numbers(at, where, "position")
     _expect_reached(place, f"{where}: position", "m")
     return np.array([
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), place[0]],

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,19 +19,17 @@ from nmm.plugins.robot.ros import reading
 from nmm.plugins.robot.ros.frames import Edge, Tree, carried, reference
 from nmm.plugins.robot.ros.joint_states import parts, timed_joints
 from nmm.plugins.robot.ros.reading import plain
-from nmm.plugins.robot.ros.storage import Log, Topic
+from nmm.plugins.robot.ros.storage import TRANSFORMS, Log, Topic
 from nmm.plugins.robot.ros.tracks import Track
 
 JOINT_STATE, ODOMETRY = "sensor_msgs/msg/JointState", "nav_msgs/msg/Odometry"
-#: As tf2 calls it, and as tf did before.
-TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 
 @dataclass(frozen=True)
 class Names:
     """Topics and frames of one robot's messages; topics without a slash in front are in its namespace."""
 
-    joints: tuple[str, ...]
+    joints: str | Sequence[str]
     odometry: str
     tf: str
     map: str
@@ -39,9 +38,23 @@ class Names:
     namespace: str
     prefix: str | None
 
+    @property
+    def of_joints(self) -> list[str]:
+        """The topics of JointStates."""
+        return [self.topic(name) for name in ([self.joints] if isinstance(self.joints, str) else self.joints)]
+
     def topic(self, name: str) -> str:
         space = self.namespace.strip("/")
         return name if name.startswith("/") else f"/{space}/{name}" if space else f"/{name}"
+
+
+@contextmanager
+def told_of(file: Path) -> Iterator[None]:
+    """In the block, errors name the file."""
+    try:
+        yield
+    except InputError as error:
+        raise (error if str(file) in error.where else error.at(file)) from None
 
 
 class Recorded:
@@ -70,7 +83,7 @@ class Recorded:
         for topic, recorded, message in log.messages([*takes]):
             for take in (take for (asked, _), take in takes.items() if asked == topic):
                 take(topic, recorded, message)
-        self.findings = [*log.findings]
+        self.findings = [*log.findings, *self.tree.place()]
         self.odometry = self._one_odometry()
         self._finish(log)
 
@@ -91,11 +104,16 @@ class Recorded:
 
     def tracks(self) -> Iterator[tuple[str, Track]]:
         """The tracks beside transforms, with the topics that they come from."""
-        joints = ", ".join(map(self.names.topic, self.names.joints))
+        joints = ", ".join(self.names.of_joints)
         for some in (self.positions, self.velocities):
             yield from ((joints, track) for track in some.values())
         yield self.odometry_topic, self.twists
         yield self.names.topic("inputs"), self.inputs
+
+    @property
+    def _framed(self) -> bool:
+        """Whether odometry and transforms are read."""
+        return bool(self.robot.platform.n_p)
 
     def _takes(self, topics: list[Topic]) -> dict[Topic, Callable[[str, int, Any], None]]:
         """The method that takes each topic's messages; `InputError` for a topic that the log lacks."""
@@ -105,12 +123,12 @@ class Recorded:
             own if (own := names.topic(name)) in present else f"/{name.lstrip('/')}"  # that of all robots
             for name in (names.tf, f"{names.tf}_static")
         )
-        joints = [names.topic(name) for name in names.joints]
+        joints = names.of_joints
         asked: list[tuple[str, tuple[str, ...], Callable[[str, int, Any], None]]] = [
             *((topic, (JOINT_STATE,), self._take_joints) for topic in joints),
             (names.topic("inputs"), (JOINT_STATE,), self._take_inputs),
         ]
-        if self.robot.platform.n_p:
+        if self._framed:
             asked += [
                 (self.odometry_topic, (ODOMETRY,), self._take_odometry),
                 (tf, TRANSFORMS, self._take_transforms),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from nmm.base.arrays import Array, Flags, Integers
 from nmm.base.errors import InputError, no_such
 from nmm.base.findings import Finding
-from nmm.plugins.robot.ros.frames import Edge, Way, bare, fixed_frames, prefixed, reference
+from nmm.plugins.robot.ros.frames import Edge, Tree, Way, bare, fixed_frames, prefixed, reference
 from nmm.plugins.robot.ros.reading import planar_rows
 from nmm.plugins.robot.ros.recorded import Recorded
 from nmm.plugins.robot.ros.tracks import Track, foretold, jumps_of, poses_at, steps_of
@@ -84,14 +85,22 @@ class Route:
         """x, y, theta (N, 3) of the reference point at times, ns; theta counts on from the first."""
         carried = np.zeros(0, dtype=np.int64) if self.carrier is None else self.carrier.poses[0]
         grid = np.union1d(times, carried[(carried > times[0]) & (carried < times[-1])])
-        whole = np.broadcast_to(np.eye(4), (len(grid), 4, 4))
-        for edge, back in self.way:
-            stamps, rows = edge.poses
-            placed = rows[-1:] if edge.static else poses_at(grid, stamps, rows, self._jumps[edge])
-            whole = whole @ (np.linalg.inv(placed) if back else placed)
+        whole = poses_along(self.way, grid, self._jumps)
         rows = planar_rows(whole @ self.tail, self.way[-1][0].child if self.way else "base")
         rows[:, 2] = np.unwrap(rows[:, 2])
         return np.asarray(rows[np.searchsorted(grid, times)])
+
+
+def poses_along(way: Way, times: Integers, jumps: Mapping[Edge, Flags]) -> Array:
+    """Poses (N, 4, 4) of the end of a way in its first frame at times, ns: each edge between its own stamps,
+    held across its jumps (M - 1,)."""
+    whole = np.broadcast_to(np.eye(4), (len(times), 4, 4))
+    for edge, back in way:
+        stamps, rows = edge.poses
+        none = np.zeros(len(stamps) - 1, dtype=bool)
+        placed = rows[-1:] if edge.static else poses_at(times, stamps, rows, jumps.get(edge, none))
+        whole = whole @ (np.linalg.inv(placed) if back else placed)
+    return whole
 
 
 def routes(recorded: Recorded) -> tuple[Route, Route | None]:
@@ -125,12 +134,19 @@ def routes(recorded: Recorded) -> tuple[Route, Route | None]:
         raise _nowhere(recorded, world, odom)
     both = [route for route in (mapped, counted) if route is not None]
     for route in both:
-        for step, back in route.way:
-            below = step.parent if back else step.child
-            if len(parents := tree.parents(below)) > 1:
-                values = {"frame": below, "parents": " and ".join(parents), "edge": step.name}
-                route.findings.append(Finding("parents_differ", values))
+        route.findings += parents_told(tree, route.way)
     return both[0], counted if mapped is not None else None
+
+
+def parents_told(tree: Tree, way: Way) -> list[Finding]:
+    """Of the frames on a way those that have several parents."""
+    findings = []
+    for step, back in way:
+        below = step.parent if back else step.child
+        if len(parents := tree.parents(below)) > 1:
+            values = {"frame": below, "parents": " and ".join(parents), "edge": step.name}
+            findings.append(Finding("parents_differ", values))
+    return findings
 
 
 def _tail_of(recorded: Recorded, frame: str) -> Array:

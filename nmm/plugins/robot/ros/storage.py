@@ -19,6 +19,7 @@ from nmm.plugins.robot.ros.chunks import (
     records_of,
 )
 from nmm.plugins.robot.ros.log import rosbags, typestore
+from nmm.plugins.robot.ros.transforms import told_in_cdr
 
 #: A topic and the type of its messages.
 Topic = tuple[str, str]
@@ -31,8 +32,8 @@ MENDS = {
     ".bag": "rosbag reindex {}",
     ".active": "rosbag reindex {}",
 }
-#: TFMessage as ROS 1 calls it, and as it called it before tf2.
-_TF1 = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+#: As tf2 calls it, and as tf did before.
+TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 
 class Log:
@@ -104,7 +105,7 @@ class _Indexed:
         self.path = path
         first = path.suffix in (".bag", ".active")
         self._reader: Callable[[Path], Any] = rosbags("rosbag1" if first else "rosbag2").Reader
-        self._decoded = of_ros1() if first else typestore().deserialize_cdr
+        self._decoded = of_ros1() if first else of_ros2()
         with Allowance(path).counting(), self._reader(path) as bag:
             for file, claims in claims_of(bag):
                 check_claims(file, claims)
@@ -118,7 +119,7 @@ class _Indexed:
                 if (connection.topic, connection.msgtype) in wanted
             ]
             for connection, time, data in bag.messages(connections=some) if some else ():
-                yield connection.topic, time, self._decoded(data, connection.msgtype)
+                yield _taken(connection.topic, connection.msgtype, time, data, self._decoded)
 
 
 class _Streamed:
@@ -129,7 +130,7 @@ class _Streamed:
 
     def __init__(self, path: Path) -> None:
         self.path, self.reason = path, ""
-        self._decoders = {"cdr": typestore().deserialize_cdr, "ros1": of_ros1()}
+        self._decoders = {"cdr": of_ros2(), "ros1": of_ros1()}
         records = Allowance(path).over(self._records())
         self.topics = [*dict.fromkeys((topic, kind) for topic, kind, _ in records if topic)]
         if not self.topics:
@@ -139,7 +140,7 @@ class _Streamed:
         for topic, kind, message in self._records():
             if message is not None and (topic, kind) in wanted:
                 encoding, record = message
-                yield topic, record.log_time, self._decoders[encoding](record.data, kind)
+                yield _taken(topic, kind, record.log_time, record.data, self._decoders[encoding])
 
     def _records(self) -> Iterator[tuple[str, str, Any]]:
         """Topic, type and None for each channel, (encoding, record) for a message."""
@@ -180,6 +181,14 @@ class _Refusing:
             raise _refused(self._path, error) from None
 
 
+def _taken(topic: str, kind: str, time: int, data: bytes, decoded: Callable[[bytes, str], Any]) -> Taken:
+    """A message decoded at once; what its decoder says of other bytes is told with the topic."""
+    try:
+        return topic, time, decoded(data, kind)
+    except Exception as error:
+        raise ValueError(f"{topic}: {error or type(error).__name__}") from None
+
+
 def _expect_readable(file: Path) -> None:
     """`InputError` for a pipe or a device among a bag's files, and for metadata as long as none are."""
     try:
@@ -208,11 +217,21 @@ def mcap(part: str) -> Any:
         ) from None
 
 
+def of_ros2() -> Callable[[bytes, str], Any]:
+    """What decodes a message of ROS 2 of a type: transforms as numbers, others as objects."""
+    objects: Callable[[bytes, str], Any] = typestore().deserialize_cdr
+
+    def decoded(data: bytes, kind: str) -> Any:
+        return told_in_cdr(data) if kind == TRANSFORMS[0] else objects(data, kind)
+
+    return decoded
+
+
 def of_ros1() -> Callable[[bytes, str], Any]:
     """What decodes a message of ROS 1 of a type."""
     typesys = rosbags("typesys")
     store = typesys.get_typestore(typesys.Stores.ROS1_NOETIC)
-    for name in _TF1:
+    for name in TRANSFORMS:
         store.register(typesys.get_types_from_msg("geometry_msgs/TransformStamped[] transforms", name))
     decoded: Callable[[bytes, str], Any] = store.deserialize_ros1
     return decoded

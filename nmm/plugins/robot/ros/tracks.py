@@ -43,10 +43,11 @@ class Track:
 
     def sorted(self) -> tuple[Integers, Array]:
         """Times (N,), ns, that increase, and rows (N, ...); of equal times the last."""
-        stamps = self.recorded if self.by_recording else self.stamps
-        latest = dict(zip(stamps, self.rows, strict=True))
-        times = np.array(sorted(latest), dtype=np.int64)
-        return times, np.array([latest[time] for time in times.tolist()])
+        stamps = np.array(self.recorded if self.by_recording else self.stamps, dtype=np.int64)
+        order = np.argsort(stamps, kind="stable")
+        times = stamps[order]
+        last = np.diff(times, append=times[-1:] + 1) > 0
+        return times[last], np.array(self.rows)[order[last]]
 
     def between(self, times: Integers) -> Array:
         """Rows (N, k) at times, ns, linear in between."""
