@@ -22,6 +22,16 @@ if TYPE_CHECKING:
     from nmm.motion.trajectory import Trajectory
 
 
+#: What ROS's logs end in; others are tables.
+BAGS = (".mcap", ".db3", ".bag")
+
+
+def is_bag(file: str) -> bool:
+    """Whether it is a log of ROS's, by its name."""
+    path = Path(file)
+    return path.suffix in BAGS or path.is_dir()
+
+
 @opening_command
 def export(
     folders: Annotated[

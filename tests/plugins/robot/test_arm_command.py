@@ -170,10 +170,10 @@ REFUSED = [
         ("touched.csv", "--seen-on", "tool0", "--seen-by", "base", *UNITS, "--time", "t"),
         "--time: it is of drives",
     ),
-    (("touched.csv", "--seen-on", "tool0", *UNITS, "--reference", "tf"), "--reference: it is of drives"),
+    (("touched.csv", "--seen-on", "tool0", *UNITS, "--reference", "tf"), "--reference: it is of bags"),
     (
         ("touched.csv", "--seen-on", "tool0", *UNITS, "--map", "map"),
-        "it is of drives, and --seen-on of an arm",
+        "--map: it is of bags, and all logs are tables",
     ),
     (("touched.csv", "--seen-on", "tool0", *SI), "were it in rad; deg would fit"),
     (("touched.csv", "--seen-on", "tool0", *UNITS, "--hold", "tracer"), "unknown number or group 'tracer'"),

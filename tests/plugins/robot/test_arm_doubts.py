@@ -96,6 +96,13 @@ def test_noise_that_no_tracker_has_is_told() -> None:
     assert (told.code, told.values["log"], told.values["other"]) == ("arm_noise_apart", "other", "points")
 
 
+def test_a_hand_s_poses_by_the_joints_own_readings_are_told() -> None:
+    q = postures()
+    assert "arm_exact" not in codes(zeros(points(q, ball(arm(), q, noise=1e-5))))
+    tool = ball(arm(), q, noise=0.0).astype(np.float32).astype(float)
+    assert codes(zeros(points(q, tool))).count("arm_exact") == 1
+
+
 @pytest.mark.parametrize("scale", [1.0, 1.02, 0.97])
 def test_a_scale_of_what_sees_is_told(scale: float) -> None:
     q = postures()

@@ -33,6 +33,8 @@ EXAMPLES: list[tuple[str, dict[str, Any], str]] = [
     ("arm_far_from_file", {"name": "offset.q2", "value": 0.5, "before": 0.0, "unit": "rad"},
      "offset.q2 is 0.5 rad where it was 0: farther than arms are made; another joint's zero, or "
      "another file?"),
+    ("postures_left_out", {"count": 1, "of": 40, "why": "nothing is seen"},
+     "1 posture of 40 left out: nothing is seen"),
     ("samples_left_out", {"log": "a.csv", "count": 2, "all": 40, "sample": 17},
      "a.csv: 2 samples of 40 left out, which no noise explains, first sample 17"),
     ("corners_left_out", {"log": "a.csv", "count": 1, "all": 900, "sample": 3},
@@ -51,6 +53,9 @@ EXAMPLES: list[tuple[str, dict[str, Any], str]] = [
     ("arm_noisy", {"log": "a.csv", "noise": 0.0109, "unit": "m"},
      "a.csv: what is left of a sighting is 0.0109 m, more than trackers and cameras are off: a gear that "
      "counts the other way, something that moved, or another robot's file?"),
+    ("arm_exact", {"log": "a.csv", "noise": 1.04e-7},
+     "a.csv: what is left of a sighting is 1e-07 m, less than anything sees: is it computed from the joints' "
+     "own readings, as a driver's tool pose is?"),
     ("arm_noise_apart", {"log": "b.csv", "noise": 0.001, "unit": "m", "least": 1e-4, "other": "a.csv"},
      "b.csv: what is left of a sighting is 0.001 m, and 0.0001 in a.csv: does what has one name stand "
      "elsewhere in it?"),
@@ -62,6 +67,17 @@ EXAMPLES: list[tuple[str, dict[str, Any], str]] = [
     ("arm_changed", {"samples": 15, "lost": 10, "times": 3.83},
      "of 15 samples that were not learned from, 10 are off as no noise explains, half of all 3.8 times as "
      "far as the first ones leave: a joint slipped, what sees was knocked, or the first show too little"),
+    ("looks_few", {"count": 3, "of": 12, "few": 6},
+     "in 3 postures of 12 what is seen comes fewer than 6 times: whether it stands there is hardly to be told"),
+    ("stamps_apart", {"topic": "/marker", "s": 0.512},
+     "stamps of /marker and of the joint states are 0.51 s apart, by when they came: it is slow to come, or "
+     "clocks are apart"),
+    ("platform_untold", {"why": "no odometry"}, "nothing tells whether the platform stood (no odometry)"),
+    ("platform_unseen", {"count": 1, "of": 12},
+     "nothing tells where the platform was in 1 posture of 12"),
+    ("platform_shifts", {"m": 0.0123, "rad": 0.004},
+     "the platform moved by up to 0.012 m and 0.004 rad between postures: what is seen is off by as much, "
+     "unless that is noise"),
 ]  # fmt: skip
 
 

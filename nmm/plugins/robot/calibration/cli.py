@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,8 +17,8 @@ from nmm.cli.groups import Figures, Loading, command
 from nmm.cli.interrupts import shielded
 from nmm.cli.options import ARGUMENT, ROBOT_HELP, arguments_of, flag, names_of, option, out_option
 from nmm.cli.output import FAILED, OK, progress, show_table, show_text, warn
-from nmm.plugins.robot.calibration.arm.cli import SightingOptions, one_each
-from nmm.plugins.robot.cli import LogOptions
+from nmm.plugins.robot.calibration.arm.cli import SightingOptions, one_each, telling
+from nmm.plugins.robot.cli import LogOptions, is_bag
 
 if TYPE_CHECKING:
     from nmm.model.robots.robot import Robot
@@ -28,8 +27,6 @@ if TYPE_CHECKING:
     from nmm.plugins.robot.calibration.drive_log import DriveLog
     from nmm.plugins.robot.calibration.patch import DescriptionPatch
 
-#: What ROS's logs end in; others are tables.
-BAGS = (".mcap", ".db3", ".bag")
 #: The reference of a drive that ends where it began.
 CLOSED = "closed"
 
@@ -78,7 +75,7 @@ def calibrate(
         list[str],
         typer.Argument(
             metavar="LOG...",
-            help="Drives: tables (CSV), rosbag2 folders, .mcap, .db3 or .bag files. Sightings: tables.",
+            help="Tables (CSV), rosbag2 folders, .mcap, .db3 or .bag files: drives, or sightings.",
             show_default=False,
         ),
     ],
@@ -87,8 +84,9 @@ def calibrate(
     reference: list[str] | None = option(
         "FILE|TOPIC|closed",
         "What saw the robot: of a table, another with stamps, x, y and theta, or closed, for a drive that "
-        "ends where it began; of a bag, tf or a topic of poses or points. One for all logs, or one for each.",
-        show="columns of the table; tf of a bag",
+        "ends where it began; of a bag, tf or a topic of poses or points, of sightings a topic or "
+        "FRAME:CHILD of TF. One for all logs, or one for each.",
+        show="columns of the table; tf of a drive's bag",
     ),
     hold: list[str] | None = option(
         "NAME[=VALUE]", "A number to keep as it is, or at a value, m, rad or s. May be repeated."
@@ -120,6 +118,7 @@ def calibrate(
     nmm calibrate my_robot.urdf drive.mcap --reference /mocap/pose --hold track
     nmm calibrate my_robot.urdf left.csv right.csv --reference closed --units wheels=ticks:2048,time=ms
     nmm calibrate my_robot.urdf touched.csv --seen-on tool0 --units joints=deg,position=mm
+    nmm calibrate my_robot.urdf touched.mcap --seen-on tool0 --reference /tracker/ball
 
     Writes calibration.yaml, which nmm.load(..., calibration=) and --calibration take, a summary, figures and,
     of a URDF, the corrected file. Exit status 1 where a part of the logs that was not learned from is
@@ -138,11 +137,14 @@ def calibrate(
     held = _held(hold)
     result: Calibration | ArmCalibration
     if of_arm.asked:
-        _expect_none({"--reference": reference, "--wrapped": wrapped, **of_bags.keywords()})
+        if wrapped is not None:
+            raise InputError("it is of drives, and --seen-on of an arm", where="--wrapped")
+        _expect_used(logs, of_tables, of_bags)
         try:
-            postures = of_arm.read(logs, loaded, of_tables.keywords())
+            postures = of_arm.read(logs, loaded, reference, of_tables.keywords(), of_bags.keywords())
         except InputError as error:
             where = re.sub(r": (on|by)\b", r": --seen-\1", error.where)
+            where = re.sub(r": (reference|odometry|tf|map|odom|base)\b", r": --\1", where)
             raise error.placed(where, expected=_as_options(error.expected)) from None
         with progress(f"{loaded.name}, {counted(sum(map(len, postures)), 'posture')}") as tell:
             result, read = of_arm.learn(loaded, postures, held, tell), []
@@ -186,11 +188,6 @@ def _show(
     show_table(["", ""], rows)
 
 
-def _is_bag(file: str) -> bool:
-    path = Path(file)
-    return path.suffix in BAGS or path.is_dir()
-
-
 def _log(
     file: str,
     reference: str | None,
@@ -203,7 +200,7 @@ def _log(
     from nmm.plugins.robot.calibration.drive_log import DriveLog
 
     read: Callable[[], DriveLog]
-    if _is_bag(file):
+    if is_bag(file):
         if reference == CLOSED:
             raise InputError("of a bag", where="--reference closed", expected="a topic, or tf")
         seen = {} if reference is None else {"reference": reference}
@@ -217,40 +214,28 @@ def _log(
         def read() -> DriveLog:
             return DriveLog.from_csv(file, robot, table, ends=ends, **of_tables.keywords(), **wrapped)
 
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", RuntimeWarning)
+    with telling(Path(file).name):
         try:
-            log = read()
+            return read()
         except InputError as error:
             raise error.placed(error.where, expected=_as_options(error.expected)) from None
-    for warning in caught:
-        warn(f"{log.name}: {warning.message}")
-    return log
 
 
 def _as_options(expected: str) -> str:
     """What a function's parameter should have been, as options: "--units wheels=rad"."""
 
-    def told(result: re.Match[str]) -> str:
+    def as_option(result: re.Match[str]) -> str:
         pairs = result["pairs"].replace("'", "").replace(": ", "=").replace(", ", ",")
         return f"--{result['name']} {pairs}".replace("=True", "").replace("=False", "=no")
 
-    text = re.sub(r"\b(?P<name>units|columns|wrapped)=\{(?P<pairs>[^}]*)\}", told, expected)
+    text = re.sub(r"\b(?P<name>units|columns|wrapped)=\{(?P<pairs>[^}]*)\}", as_option, expected)
     text = text.replace("ends='closed'", "--reference closed")
-    return re.sub(r"\b(reference|map|odom|odometry|wrapped)=(?=[ ,;]|$)", r"--\1", text)
-
-
-def _expect_none(given: dict[str, Any]) -> None:
-    """`InputError` for an option that is of drives."""
-    for name, value in given.items():
-        if value is not None:
-            where = name if name.startswith("--") else f"--{name}"
-            raise InputError("it is of drives, and --seen-on of an arm", where=where)
+    return re.sub(r"\b(reference|map|odom|odometry|wrapped|prefix)=(?=[ ,;]|$)", r"--\1", text)
 
 
 def _expect_used(logs: Sequence[str], of_tables: TableOptions, of_bags: LogOptions) -> None:
     """`InputError` for an option that no log is of."""
-    bags = [_is_bag(file) for file in logs]
+    bags = [is_bag(file) for file in logs]
     for none, options, what in (
         (all(bags), of_tables.keywords(), "is of tables, and all logs are bags"),
         (not any(bags), of_bags.keywords(), "is of bags, and all logs are tables"),

@@ -25,10 +25,10 @@ from nmm.plugins.robot.calibration.log_checks import (
 from nmm.plugins.robot.calibration.log_reference import check_reference
 from nmm.plugins.robot.calibration.log_turns import counted_on, stated_for
 from nmm.plugins.robot.calibration.log_units import Counter, counters_of, unit_of
-from nmm.plugins.robot.calibration.recorded_drive import POINT, TF, RecordedDrive
+from nmm.plugins.robot.calibration.recorded_seen import POINT, TF, RecordedSeen
 from nmm.plugins.robot.ros.frames import SAME, Edge, prefixed, reference
 from nmm.plugins.robot.ros.reading import plain, planar_rows
-from nmm.plugins.robot.ros.recorded import Names
+from nmm.plugins.robot.ros.recorded import Names, told_of
 from nmm.plugins.robot.ros.routes import AHEAD, Route, routes
 from nmm.plugins.robot.ros.tracks import settle
 
@@ -55,12 +55,9 @@ def from_bag(
 ) -> DriveLog:
     """See `DriveLog.from_bag`."""
     file = Path(path)
-    topics = (joints,) if isinstance(joints, str) else tuple(joints)
-    names = Names(topics, odometry, tf, map, odom, base, namespace, prefix)
-    try:
+    names = Names(joints, odometry, tf, map, odom, base, namespace, prefix)
+    with told_of(file):
         made, findings = _read(file, robot, reference, names, wrapped, file.name if name is None else name)
-    except InputError as error:
-        raise (error if str(file) in error.where else error.at(file)) from None
     for finding in findings:
         warnings.warn(f"{made.name}: {finding}", RuntimeWarning, stacklevel=3)
     return made
@@ -70,7 +67,7 @@ def _read(
     file: Path, robot: Robot, reference: str, names: Names, wrapped: Wrapped, title: str
 ) -> tuple[DriveLog, list[Finding]]:
     counters = counters_of(robot)
-    recorded = RecordedDrive(robot, file, names, counters, None if reference == TF else reference)
+    recorded = RecordedSeen(robot, file, names, counters, None if reference == TF else reference)
     route = _route(recorded) if reference == TF else None
     if route is None:
         _expect_no_odometry(recorded)
@@ -99,7 +96,7 @@ def _read(
 
 
 def _measured(
-    recorded: RecordedDrive, counters: dict[str, Counter], wrapped: Wrapped, findings: list[Finding]
+    recorded: RecordedSeen, counters: dict[str, Counter], wrapped: Wrapped, findings: list[Finding]
 ) -> tuple[MeasuredDrive, int]:
     """Counters at the stamps at which any comes, while all are known; and the first of these, ns."""
     counted = [*recorded.positions]
@@ -110,7 +107,7 @@ def _measured(
     ]
     if not any(counters[name].group == "wheels" for name in counted):
         wheels = [name for name, counter in counters.items() if counter.group == "wheels"]
-        topics = few([recorded.names.topic(topic) for topic in recorded.names.joints])
+        topics = few(recorded.names.of_joints)
         raise InputError(f"no wheel's position or velocity on {topics}", expected=f"any of {few(wheels)}")
     asked, rows, stamps, anew = stated_for(wrapped, counted, "bag"), {}, {}, []
     for name in counted:
@@ -143,7 +140,7 @@ def _time_of(stamps: Integers) -> Callable[[int], str]:
     return lambda k: f"t = {(stamps[k] - stamps[0]) / 1e9:.6g} s"
 
 
-def _route(recorded: RecordedDrive) -> Route:
+def _route(recorded: RecordedSeen) -> Route:
     """The way from the map to the platform; `InputError` where wheels counted it, or there is none."""
     names = recorded.names
     world, odom = (
@@ -165,7 +162,7 @@ def _route(recorded: RecordedDrive) -> Route:
     return route
 
 
-def _by_route(recorded: RecordedDrive, route: Route) -> tuple[Integers, Array]:
+def _by_route(recorded: RecordedSeen, route: Route) -> tuple[Integers, Array]:
     """Stamps, ns, and x, y, heading (M, 3): where a localisation corrects odometry, at its corrections, since
     in between it is odometry; else wherever a pose comes."""
     changing = [edge for edge in route.corrects if not edge.constant]
@@ -199,16 +196,10 @@ def _changes(edge: Edge) -> Integers:
     return np.asarray(times[1:][other])
 
 
-def _expect_no_odometry(recorded: RecordedDrive) -> None:
+def _expect_no_odometry(recorded: RecordedSeen) -> None:
     """`InputError` for a topic of what wheels counted, for one of several frames, and for one without any."""
     topic, names = recorded.topic, recorded.names
-    expect(len(recorded.seen) > 1, f"reference {topic}", "at least two messages", len(recorded.seen))
-    if len(recorded.frames) > 1:
-        available = [f"{child or 'poses'} in {frame}" for frame, child in sorted(recorded.frames)]
-        raise InputError(
-            "poses in several frames on one topic", where=f"reference {topic}", available=available
-        )
-    ((frame, child),) = recorded.frames
+    frame, child = recorded.only()
     own = {prefixed(names.odom, recorded.prefix, {frame, *recorded.tree.frames}), plain(names.odom)}
     if frame in own or (topic == recorded.odometry_topic and frame != plain(names.map)):
         what = f"{topic} is what the wheels counted ({child or 'a pose'} in {frame or 'no frame'})"
@@ -218,13 +209,13 @@ def _expect_no_odometry(recorded: RecordedDrive) -> None:
         raise InputError(what, where="reference", expected=expected)
 
 
-def _by_topic(recorded: RecordedDrive) -> tuple[Integers, Array]:
+def _by_topic(recorded: RecordedSeen) -> tuple[Integers, Array]:
     """Stamps, ns, and x, y, heading (M, 3) or x, y (M, 2) of the reference's topic: of the platform's
     reference point where messages name a frame that leads to it."""
     times, rows = recorded.seen.sorted()
     if recorded.kind == POINT:
         return times, rows[:, :2]
-    ((_, child),) = recorded.frames
+    _, child = recorded.only()
     if child:
         with suppress(InputError):  # a body of motion capture: where it sits on the robot is learned
             names = recorded.names

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from nmm.base.errors import InputError, expect
 from nmm.cli.options import names_of, option
 from nmm.cli.output import warn
+from nmm.plugins.robot.cli import is_bag
 
 if TYPE_CHECKING:
     from nmm.base.progress import Progress
@@ -26,8 +28,9 @@ class SightingOptions:
 
     on: str | None = option(
         "FRAME|world",
-        "The logs are sightings of an arm, a row a posture: the frame that carries what is seen (points x, "
-        "y, z; poses, with qx, qy, qz, qw; corners u1, v1, ...).",
+        "The logs are sightings of an arm: the frame that carries what is seen. A posture is a row of a "
+        "table (points x, y, z; poses, with qx, qy, qz, qw; corners u1, v1, ...) or, in a bag, wherever the "
+        "arm stands.",
         "--seen-on",
         show="logs are of drives",
     )
@@ -64,41 +67,61 @@ class SightingOptions:
                 )
         return self.on is not None
 
-    def read(self, files: Sequence[str], robot: Robot, keywords: Mapping[str, Any]) -> list[Sightings]:
-        """The sightings in tables, by their files' names, with folders where two are the same."""
+    def read(
+        self,
+        files: Sequence[str],
+        robot: Robot,
+        reference: Sequence[str] | None,
+        of_tables: Mapping[str, Any],
+        of_bags: Mapping[str, Any],
+    ) -> list[Sightings]:
+        """The sightings in tables and bags, by their files' names, with folders where two are the same."""
         paths = [Path(file) for file in files]
-        for k, path in enumerate(paths):
-            expect(path not in paths[:k], files[k], "each log once")
-        sensors, targets = (
-            one_each(asked, files, where)
-            for asked, where in ((self.sensor, "--sensor"), (self.target, "--target"))
-        )
+        each = {
+            name: one_each(asked, files, f"--{name}")
+            for name, asked in (("reference", reference), ("sensor", self.sensor), ("target", self.target))
+        }
+        both = [(path, seen if is_bag(str(path)) else None)
+                for path, seen in zip(paths, each["reference"], strict=True)]  # fmt: skip
+        for k, once in enumerate(both):
+            expect(once not in both[:k], files[k], "each log once, a bag once for each --reference")
+        if reference is not None and not any(map(is_bag, files)):
+            what = "it is of bags: what is seen is in a table's own columns"
+            raise InputError(what, where="--reference")
         several = [path.name for path in paths]
         logs = []
-        for path, file, sensor, target in zip(paths, files, sensors, targets, strict=True):
+        for k, (path, file) in enumerate(zip(paths, files, strict=True)):
             name = path.name if several.count(path.name) == 1 else path.as_posix()
-            own = {"name": name, "sensor": sensor or "", "target": target or ""}
-            logs.append(self._read(file, robot, own, keywords))
+            own = {"name": name} | {option: values[k] or "" for option, values in each.items()}
+            seen = own.pop("reference") or None
+            if is_bag(file):
+                logs.append(self._read_bag(file, robot, {"reference": seen, **own, **of_bags}))
+            else:
+                logs.append(self._read_table(file, robot, {**own, **of_tables}))
         return logs
 
-    def _read(
-        self, file: str, robot: Robot, own: Mapping[str, Any], keywords: Mapping[str, Any]
-    ) -> Sightings:
-        """The sightings in a table; what reading it found is told."""
+    def _read_table(self, file: str, robot: Robot, keywords: Mapping[str, Any]) -> Sightings:
         from nmm.plugins.robot.calibration.arm.sightings import WORLD, Sightings
 
         assert self.on is not None
-        for name in keywords:
-            if name not in ("units", "columns", "delimiter"):
+        for name in ("time", "reference_time", "shift"):
+            if name in keywords:
                 where = f"--{name.replace('_', '-')}"
                 raise InputError("it is of drives", where=where, expected="nothing: postures have no times")
         of_camera: dict[str, Any] = {"camera": self.camera, "board": self.board}
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", RuntimeWarning)
-            log = Sightings.from_csv(file, robot, self.on, self.by or WORLD, **of_camera, **own, **keywords)
-        for warning in caught:
-            warn(f"{log.name}: {warning.message}")
-        return log
+        with telling(keywords["name"]):
+            return Sightings.from_csv(file, robot, self.on, self.by or WORLD, **of_camera, **keywords)
+
+    def _read_bag(self, file: str, robot: Robot, keywords: Mapping[str, Any]) -> Sightings:
+        from nmm.plugins.robot.calibration.arm.sightings import WORLD, Sightings
+
+        assert self.on is not None
+        for name in ("camera", "board"):
+            if getattr(self, name) is not None:
+                expected = "poses of what a camera sees, or corners in a table"
+                raise InputError("a bag has no corners", where=f"--{name}", expected=expected)
+        with telling(keywords["name"]), _by_options():
+            return Sightings.from_bag(file, robot, self.on, self.by or WORLD, **keywords)
 
     def learn(
         self, robot: Robot, logs: Sequence[Sightings], held: Mapping[str, float | None], tell: Progress | None
@@ -109,24 +132,37 @@ class SightingOptions:
         ratios: Any = () if self.ratios is None else True
         if self.ratios not in (None, "all"):
             ratios = names_of(self.ratios, "--ratios", "JOINT, JOINT, ..., or all")
-        try:
+        with _by_options():
             return calibrate_arm(robot, logs, held, ratios, tell)
-        except InputError as error:
-            raise error.placed(error.where, expected=_as_options(error.expected)) from None
+
+
+@contextmanager
+def telling(name: str) -> Iterator[None]:
+    """What reading a log in the block warns of is told, with the log's name."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", RuntimeWarning)
+        yield
+    for warning in caught:
+        warn(f"{name}: {str(warning.message).removeprefix(f'{name}: ')}")
 
 
 def one_each(asked: Sequence[str] | None, logs: Sequence[str], where: str) -> list[str | None]:
     """What an option says of each log, where it is given once for all, or for each."""
-    given = [*(asked or [])]
-    if len(given) in (0, 1):
-        return [given[0] if given else None] * len(logs)
-    expect(len(given) == len(logs), where, f"one, or one for each of {len(logs)} logs", len(given))
-    return [*given]
+    values = [*(asked or [])]
+    if len(values) in (0, 1):
+        return [values[0] if values else None] * len(logs)
+    expect(len(values) == len(logs), where, f"one, or one for each of {len(logs)} logs", len(values))
+    return [*values]
 
 
-def _as_options(expected: str) -> str:
-    """What parameters should have been, as options: "--seen-by camera_optical_frame"."""
-    text = re.sub(r"\b(on|by)='([^']*)'", r"--seen-\1 \2", expected)
-    text = re.sub(r"\b(hold)='([^']*)'", r"--\1 \2", text)
-    text = re.sub(r"\bbase=", "columns base_x, base_y, base_theta", text)
-    return re.sub(r"\b(sensor|target)=", r"--\1", text)
+@contextmanager
+def _by_options() -> Iterator[None]:
+    """What parameters should have been is told as options: "--seen-by camera_optical_frame"."""
+    try:
+        yield
+    except InputError as error:
+        text = re.sub(r"\b(on|by)='([^']*)'", r"--seen-\1 \2", error.expected)
+        text = re.sub(r"\b(hold)='([^']*)'", r"--\1 \2", text)
+        text = re.sub(r"\bbase=", "columns base_x, base_y, base_theta", text)
+        text = re.sub(r"\b(sensor|target)=", r"--\1", text)
+        raise error.placed(error.where, expected=text) from None

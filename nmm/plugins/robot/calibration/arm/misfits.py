@@ -17,7 +17,9 @@ from nmm.plugins.robot.calibration.arm.view import some_of
 
 #: Noise of what sees is no more than this: of a tracker m and rad, of a camera px.
 NOISY = {PLACE: (2e-3, "m"), TURN: (0.01, "rad"), PIXEL: (1.0, "px")}
-#: Nor so many times that of another log of its kind.
+#: Of what was seen, and not computed from the joints' own readings, more than this is left, m.
+EXACT = 1e-6
+#: Noise of one log is no more than so many times that of another log of its kind.
 APART = 5.0
 #: Where such a share of what was seen is left out, it is not of this arm.
 MANY = 0.2
@@ -45,6 +47,8 @@ def _noisy(model: ArmModel, fitted: ArmFit) -> list[Finding]:
     for g, (i, kind) in enumerate(model.groups):
         most, unit = NOISY[kind]
         noise = float(fitted.noise[g])
+        if kind == PLACE and noise < EXACT:
+            findings.append(Finding("arm_exact", {"log": names[i], "noise": noise}))
         if noise > most:
             findings.append(Finding("arm_noisy", {"log": names[i], "noise": noise, "unit": unit}))
             continue

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.base.arrays import Array, Flags, array, matrix, unwritable, vector
-from nmm.base.errors import InputError, expect, expect_kind, expect_known
+from nmm.base.arrays import Array, Flags, matrix, unwritable, vector
+from nmm.base.errors import expect, expect_kind, expect_known
 from nmm.base.lazy_call import lazy_call
 from nmm.plugins.robot.calibration.arm.intrinsics import CameraIntrinsics
+from nmm.plugins.robot.calibration.arm.seen import checked_seen
 
 if TYPE_CHECKING:
     from nmm.model.robots.robot import Robot
@@ -27,10 +28,6 @@ SENSORS = {"points": "tracker", "poses": "tracker", "corners": "camera"}
 TARGETS = {"points": "point", "poses": "body", "corners": "board"}
 #: Beginnings of the names of a robot's numbers.
 TAKEN = ("radius", "offset", "ratio", "origin", "noise", "held_out", "whiteness", "findings")
-#: Board points are in a line where they lie so near to one, as a share of its length.
-LINE = 1e-3
-#: Corners a picture may show outside its edges, px: corners are found between pixels.
-EDGE = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +94,7 @@ class Sightings:
         expect(
             isinstance(self.readings, Mapping) and self.readings, f"{where}: readings", "readings by joint"
         )
-        seen = self._checked_seen(where)
+        seen, board = checked_seen(self.seen, self.kind, self.camera, self.board, where)
         many = len(seen)
         expect(many > 2, where, "at least three samples", many)
         readings = {
@@ -115,6 +112,7 @@ class Sightings:
         expect(self.sensor != self.target, where, "two names: sensor and target", self.sensor)
         object.__setattr__(self, "readings", readings)
         object.__setattr__(self, "seen", unwritable(seen))
+        object.__setattr__(self, "board", None if board is None else unwritable(board))
 
     def __len__(self) -> int:
         """How many samples there are, N."""
@@ -193,72 +191,66 @@ class Sightings:
                               sensor=sensor, target=target, delimiter=delimiter, name=name)  # fmt: skip
         return log
 
-    def _checked_seen(self, where: str) -> Array:
-        at = f"{where}: seen"
-        if self.kind == "corners":
-            return self._checked_corners(where)
-        for name in ("camera", "board"):
-            expect(getattr(self, name) is None, f"{where}: {name}", "none: it is of corners")
-        rows = array(self.seen, at)
-        if self.kind == "points":
-            expect(rows.ndim == 2 and rows.shape[1] == 3, at, "points of shape (N, 3)", rows.shape)
-            return rows
-        if rows.ndim == 2 and rows.shape[1] == 7:
-            from scipy.spatial.transform import Rotation
+    @classmethod
+    def from_bag(
+        cls,
+        path: str | Path,
+        robot: Robot,
+        on: str,
+        by: str = WORLD,
+        reference: str | None = None,
+        *,
+        joints: str | Sequence[str] = "joint_states",
+        odometry: str = "odom",
+        tf: str = "tf",
+        map: str = "map",
+        odom: str = "odom",
+        base: str | None = None,
+        namespace: str = "",
+        prefix: str | None = None,
+        sensor: str = "",
+        target: str = "",
+        name: str | None = None,
+    ) -> Sightings:
+        """The sightings in a rosbag2 folder, an .mcap, a .db3 or ROS 1's .bag file, recorded all the while.
 
-            lengths = np.linalg.norm(rows[:, 3:], axis=1)
-            k = int(np.argmax(np.abs(lengths - 1.0)))
-            expect(abs(lengths[k] - 1.0) < 0.01, f"{at}: sample {k}", "a quaternion of length 1", rows[k, 3:])
-            made = np.tile(np.eye(4), (len(rows), 1, 1))
-            made[:, :3, :3] = Rotation.from_quat(rows[:, 3:]).as_matrix()
-            made[:, :3, 3] = rows[:, :3]
-            return made
-        fits = rows.ndim == 3 and rows.shape[1:] == (4, 4)
-        expect(fits, at, "poses of shape (N, 7) or (N, 4, 4)", rows.shape)
-        R = rows[:, :3, :3]
-        off = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(axis=(1, 2)) + (np.linalg.det(R) < 0.0)
-        off += np.abs(rows[:, 3] - [0.0, 0.0, 0.0, 1.0]).max(axis=1)
-        k = int(np.argmax(off))
-        expect(off[k] < 0.01, f"{at}: sample {k}", "a placement [R p; 0 0 0 1], R a rotation", rows[k])
-        return rows
+        A sample is taken wherever all joints of the arm stand for 0.8 s: means of what they read and of what
+        is seen, without its outliers, from a quarter of a second after they stop until a quarter before they
+        go on, so that clocks may be as far apart. What moves by less than 0.01 rad in half a second stands.
 
-    def _checked_corners(self, where: str) -> Array:
-        expect_kind(self.camera, CameraIntrinsics, f"{where}: camera", "a nmm.CameraIntrinsics, of corners")
-        assert self.camera is not None
-        if self.board is None:
-            raise InputError(where=f"{where}: board", expected="its points (m, 3), m")
-        board = array(self.board, f"{where}: board")
-        expect(board.ndim == 2 and board.shape[1] == 3, f"{where}: board", "points (m, 3), m", board.shape)
-        sizes = np.linalg.svd(board - board.mean(axis=0), compute_uv=False)
-        in_line = len(board) < 3 or sizes[1] < LINE * max(sizes[0], 1e-300)
-        expect(not in_line, f"{where}: board", "points that are not in one line", board)
-        try:
-            rows = np.array(self.seen, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise InputError(where=f"{where}: seen", expected="pixels", got=self.seen) from None
-        expected = f"pixels of shape (N, {len(board)}, 2), as the board's points"
-        expect(rows.ndim == 3 and rows.shape[1:] == (len(board), 2), f"{where}: seen", expected, rows.shape)
-        half = np.isfinite(rows).sum(axis=2)
-        for bad, expected in (
-            ((half == 1) | np.isinf(rows).any(axis=2), "both of u and v, or NaN for both"),
-            (self._outside(rows), "pixels in the picture"),
-        ):
-            if bad.any():
-                k, j = np.argwhere(bad)[0].tolist()
-                at = f"{where}: sample {k}, corner {j}"
-                raise InputError(where=at, expected=expected, got=rows[k, j].tolist())
-        empty = np.flatnonzero(~(half == 2).any(axis=1))
-        expect(not len(empty), f"{where}: sample {empty[:1]}", "at least one corner seen")
-        object.__setattr__(self, "board", unwritable(board))
-        return rows
+        Parameters
+        ----------
+        path, robot : the bag, and whose joints are in it
+        on, by, sensor, target : as of the constructor
+        reference : the topic of what is seen, of PoseStamped, PoseWithCovarianceStamped, TransformStamped,
+            Odometry or, of points, PointStamped; or in TF the frame that sees and the one that is seen,
+            "camera_optical_frame:marker_3". Never guessed
+        joints, odometry, tf, map, odom, base, namespace, prefix : topics and frames, as of `nmm.read_bag`;
+            odometry and transforms tell whether the platform stands, and are looked for where they are asked
+            for
+        name : of the log; the file's by default
 
-    def _outside(self, rows: Array) -> Flags:
-        assert self.camera is not None
-        bad = np.zeros(rows.shape[:2], dtype=bool)
-        for axis, size in enumerate((self.camera.width, self.camera.height)):
-            if size is not None:
-                bad |= (rows[:, :, axis] < -EDGE) | (rows[:, :, axis] > size - 1.0 + EDGE)
-        return bad
+        Raises
+        ------
+        InputError : no bag; a topic, a frame or a joint that is missing; messages that speak of another frame
+            of the robot than `on` and `by`; transforms that the robot's own joints made; an arm that does not
+            stand, or is seen moving where its joints stand, or in two places by turns; clocks a second apart;
+            a platform that moves. What is left out, and what is in doubt, is a `RuntimeWarning`
+
+        Examples
+        --------
+        >>> robot = nmm.load("unicycle_2r")
+        >>> run = nmm.Scenario.load("unicycle_2r_position", {"duration": 0.5}).run()
+        >>> nmm.Sightings.from_bag(run.save_mcap("run.mcap"), robot, "ee")
+        Traceback (most recent call last):
+            ...
+        nmm.base.errors.InputError: run.mcap: reference: expected what saw it: a topic of poses or points, ...
+        """
+        made = lazy_call("nmm.plugins.robot.calibration.arm.sightings_bag:from_bag")
+        log: Sightings = made(path, robot, on, by, reference, joints=joints, odometry=odometry, tf=tf,
+                              map=map, odom=odom, base=base, namespace=namespace, prefix=prefix,
+                              sensor=sensor, target=target, name=name)  # fmt: skip
+        return log
 
 
 def named_apart(logs: Sequence[Sightings]) -> list[Sightings]:
