@@ -83,7 +83,7 @@ def drive(
         looks = looks + rng.normal(size=looks.shape) * [PLACE, PLACE, HEADING]
         for name, values in counts.items():
             tick = 2.0 * math.pi / (TICKS if name in world.wheels else FINE)
-            counts[name] = tick * np.floor(values / tick)
+            counts[name] = tick * (np.floor(values / tick) + 0.5)
     truth = dict(zip(("reference.x", "reference.y", "reference.yaw"), mount.tolist(), strict=True))
     log = nmm.DriveLog("drive", t[first::READ] - REST, counts, t[first::LOOK] - REST + DELAY, looks, "poses")
     return log, truth | {"delay": DELAY, "clock": 0.0}

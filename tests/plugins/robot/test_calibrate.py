@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tracemalloc
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -99,6 +100,21 @@ def test_noise_is_what_was_put_in() -> None:
     assert noise.place == pytest.approx(0.004, rel=0.15)
     assert noise.heading == pytest.approx(0.002, rel=0.15)
     assert noise.counters == pytest.approx(0.03, rel=0.15)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_wheels_that_disagree_show_how_noisy_they_are(seed: int) -> None:
+    """Four of them, for three inputs: where a short drive leaves open what the ground did and what they did,
+    it is no less than that."""
+    robot, rng = nmm.load("omni_base", platform="mecanum"), np.random.default_rng(seed)
+    log = drive(robot, inputs=every_way, seconds=30.0, slip=0.0, place=0.005, heading=0.005, seed=seed)
+    readings = {}
+    for name, values in log.readings.items():
+        steps = 0.01 * np.sqrt(np.abs(np.diff(values))) * rng.normal(size=len(values) - 1)
+        readings[name] = values + np.concatenate([[0.0], np.cumsum(steps)])
+    found = nmm.calibrate(robot, replace(log, readings=readings))
+    assert found.noise.counters == pytest.approx(0.01, rel=0.2)
+    assert max(map(abs, off(found, {}).values())) < 4.0
 
 
 def test_least_squares_of_a_plain_model_finds_the_same() -> None:

@@ -49,6 +49,9 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
      "over 15 windows of 2.2 m that were not learned from, dead reckoning by the new "
      "numbers: no difference (0.0085 m off after 0.008 m, p = 0.4)"),
     ("no_held_out", {}, {}, "the drives are too short for a part of them to be held out"),
+    ("size_or_clock", {"by": 11.1, "larger": True, "clock": 10.0}, {},
+     "wheels seem 11 % larger: steady motion does not tell that from a reference's clock that runs 10 % "
+     "slow; to tell them apart, speed up and slow down"),
     ("clocks_apart", {"log": "a.csv", "rate": 18.0, "faster": False, "apart": 30.0}, {},
      "a.csv: the reference's clock runs 18 ms a minute slower than the encoders': 30 ms over the drive"),
 ]  # fmt: skip

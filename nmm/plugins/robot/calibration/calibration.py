@@ -18,6 +18,7 @@ from nmm.model.robots.robot import Robot
 from nmm.plugins.robot.calibration.arm.calibration import ArmCalibration, calibrate_arm
 from nmm.plugins.robot.calibration.arm.sightings import Sightings
 from nmm.plugins.robot.calibration.checks import check_alike, check_ends, check_logs, check_numbers
+from nmm.plugins.robot.calibration.clocks import check_clocks, told_by_clocks
 from nmm.plugins.robot.calibration.doubts import of_drives, of_numbers, of_rest
 from nmm.plugins.robot.calibration.drive_log import DriveLog
 from nmm.plugins.robot.calibration.drives import (
@@ -33,7 +34,7 @@ from nmm.plugins.robot.calibration.kept import Hold, file_of
 from nmm.plugins.robot.calibration.mixed_up import check_mixed_up
 from nmm.plugins.robot.calibration.model import DriveNoise, Model
 from nmm.plugins.robot.calibration.mounting import check_mounting
-from nmm.plugins.robot.calibration.parameters import LearnedNumber
+from nmm.plugins.robot.calibration.parameters import CLOCK, LearnedNumber
 from nmm.scenario.calibration_file import CalibrationFile
 
 
@@ -213,18 +214,22 @@ def calibrate(
     held = held_numbers(Model(robot, counters, drives), asked, where)
     for drive in drives:
         check_mixed_up(robot, counters, drive, asked)
-    delays = [held_delay(asked, drive) for drive in drives]
-    drives = [
-        used_looks(drive, first_delay(counters, drive) if delay is None else delay)
-        for drive, delay in zip(drives, delays, strict=True)
-    ]
-    model = Model(robot, counters, drives)
-    for drive in drives:
-        check_alike(model, drive, where)
-    steps = iter(np.linspace(0.05, 0.75, 12).tolist())
-    fitted = fit(model, held, lambda _: tell(next(steps, 0.75)))
-    for check in (check_ends, check_numbers, check_mounting):
-        check(model, fitted, where)
+    by_clocks = [] if CLOCK in asked else drives  # who holds it knows that they run alike
+    for drive in by_clocks:
+        check_clocks(counters, drive)
+    with told_by_clocks(counters, by_clocks):
+        delays = [held_delay(asked, drive) for drive in drives]
+        drives = [
+            used_looks(drive, first_delay(counters, drive) if delay is None else delay)
+            for drive, delay in zip(drives, delays, strict=True)
+        ]
+        model = Model(robot, counters, drives)
+        for drive in drives:
+            check_alike(model, drive, where)
+        steps = iter(np.linspace(0.05, 0.75, 12).tolist())
+        fitted = fit(model, held, lambda _: tell(next(steps, 0.75)))
+        for check in (check_ends, check_numbers, check_mounting):
+            check(model, fitted, where)
     model.forget()
     tell(0.8)
     predicted = held_out(model, fitted)

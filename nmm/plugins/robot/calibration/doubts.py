@@ -7,6 +7,7 @@ from collections.abc import Collection
 import numpy as np
 
 from nmm.base.findings import Finding
+from nmm.plugins.robot.calibration.clocks import shows_no_clock
 from nmm.plugins.robot.calibration.fit import Fit
 from nmm.plugins.robot.calibration.innovations import BEGINS, LEFT_OUT
 from nmm.plugins.robot.calibration.judged import CHANCE, HeldOut
@@ -15,6 +16,8 @@ from nmm.plugins.robot.calibration.parameters import CLOCK
 
 #: A number that is so many times as far from the file's as is plausible.
 FAR = 2.0
+#: Wheels that are all off by a smaller share are not asked whether it is a clock.
+UNLIKE = 0.02
 #: A clock that runs apart by less over the drive, s, is none that does.
 APART = 0.005
 
@@ -31,6 +34,7 @@ def of_numbers(model: Model, fitted: Fit) -> list[Finding]:
     scales = [model.learned[i].name for i in fitted.free if model.learned[i].kind == "scale"]
     if scales:
         far.append(Finding("of_the_log", {"names": scales}))
+    far += _size_or_clock(model, fitted)
     return far + [
         Finding(
             "not_shown",
@@ -45,6 +49,24 @@ def of_numbers(model: Model, fitted: Fit) -> list[Finding]:
         for i, others in fitted.unseen.items()
         if model.learned[i].kind != CLOCK
     ]
+
+
+def _size_or_clock(model: Model, fitted: Fit) -> list[Finding]:
+    """Where all wheels are as much larger, or smaller, as a clock could do that the drives do not show."""
+    wheels = [i for i, number in enumerate(model.learned) if number.kind in ("radius", "scale")]
+    clocks = [i for i, number in enumerate(model.learned) if number.kind == CLOCK]
+    if not wheels or not {*wheels} <= {*fitted.free} or not clocks or not {*clocks} <= {*fitted.unseen}:
+        return []
+    shares = fitted.values[wheels] / model.first[wheels]
+    by = float(shares.mean()) - 1.0
+    deviations = fitted.deviations[[fitted.free.index(i) for i in wheels]] / model.first[wheels]
+    if not abs(by) > max(UNLIKE, 4.0 * float(deviations.max()), 2.0 * float(np.ptp(shares))):
+        return []
+    clock = -by / (1.0 + by)
+    if not all(drive.ends or shows_no_clock(model.counters, drive, clock) for drive in model.drives):
+        return []
+    values = {"by": 100.0 * abs(by), "larger": by > 0.0, "clock": 100.0 * abs(clock)}
+    return [Finding("size_or_clock", values)]
 
 
 def of_drives(model: Model, held: Collection[int]) -> list[Finding]:

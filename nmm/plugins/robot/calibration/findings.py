@@ -24,6 +24,9 @@ WORDS: dict[str, Words] = {
     "not_better": "over {windows} windows of {length:.2g} m that were not learned from, dead reckoning by "
     "the new numbers: {verdict} ({after:.3g} m off after {before:.3g} m, p = {p:.2g})",
     "no_held_out": "the drives are too short for a part of them to be held out",
+    "size_or_clock": "wheels seem {by:.2g} % {larger:if larger}{larger:else smaller}: steady motion does not "
+    "tell that from a reference's clock that runs {clock:.2g} % {larger:if slow}{larger:else fast}; to tell "
+    "them apart, speed up and slow down",
     "clocks_apart": "{log}: the reference's clock runs {rate:.3g} ms a minute "
     "{faster:if faster}{faster:else slower} than the encoders': {apart:.3g} ms over the drive",
 }

@@ -47,8 +47,8 @@ MOST = DriveNoise(
 #: While outliers are sought, numbers stay about within so many times what is plausible.
 PRIOR = 1.0
 #: Below so many innovations a number, noise is judged with the numbers that were learned from them
-#: (restricted likelihood).
-FEW = 100
+#: (restricted likelihood); below more at last, where that is done once.
+FEW, FEW_AT_LAST = 100, 400
 #: Steps of least squares end when no number moves by such a share of its deviation.
 SMALL, STEPS = 0.02, 25
 #: They also end when twice the logarithm of the likelihood gains less.
@@ -122,7 +122,7 @@ def fit(
         progress(f"least squares, {turn + 1} of 2")
         values = solve(model, values, free, level)
         if like is None:
-            level = noise_of(model, values, free, level)
+            level = noise_of(model, values, free, level, FEW_AT_LAST if turn else FEW)
     values = solve(model, values, free, level)
     filtered = model.filtered(values, free, model.stretched(values, free), level)
     w, W = stacked(filtered, len(free))
@@ -229,17 +229,22 @@ def solve(
     return values
 
 
-def noise_of(model: Model, values: Array, free: Sequence[int], first: DriveNoise) -> DriveNoise:
+def noise_of(
+    model: Model, values: Array, free: Sequence[int], first: DriveNoise, few: int = FEW
+) -> DriveNoise:
     """The noise of greatest likelihood at these numbers; of drives of which only the ends are known that of
-    the counters alone. With few looks it is that of what the free numbers leave (D. A. Harville, Maximum
-    likelihood approaches to variance component estimation, JASA 72, 1977)."""
+    the counters alone. Counters err no less than those of one robot disagree. With less than `few`
+    innovations a number it is that of what the free numbers leave (D. A. Harville, Maximum likelihood
+    approaches to variance component estimation, JASA 72, 1977)."""
     made = model.stretched(values, [])
     as_before = model.filtered(values, [], made, first)
     beside = [drive_fit.agreement for drive_fit in as_before]
-    if count := sum(part.free for part in beside):
+    least = LEAST
+    if spare := sum(part.free for part in beside):
         square = sum(float(part.over @ part.over) for part in beside)
-        level = first.agreement * math.sqrt(square / count)
-        first = first._replace(agreement=min(max(level, LEAST.agreement), MOST.agreement))
+        level = min(first.agreement * math.sqrt(square / spare), MOST.agreement)
+        first = first._replace(agreement=max(level, LEAST.agreement))
+        least = LEAST._replace(counters=max(level, LEAST.counters))
     first = _of_hitches(model, as_before, first)
     looked = model.with_looks
     sought = ["counters", *(["place", "across", "turns", "jitter"] if looked else [])]
@@ -248,22 +253,22 @@ def noise_of(model: Model, values: Array, free: Sequence[int], first: DriveNoise
     if not looked:
         first = first._replace(**OF_ENDS)
     count = sum(np.count_nonzero(drive_fit.taken) * drive_fit.w.shape[1] for drive_fit in as_before)
-    few = count < FEW * len(free)
-    if few:
+    restricted = count < few * len(free)
+    if restricted:
         made = model.stretched(values, free)
 
     def noise_at(logs: Array) -> DriveNoise:
         return first._replace(**dict(zip(sought, np.exp(logs).tolist(), strict=True)))
 
     def cost(logs: Array) -> float:
-        filtered = model.filtered(values, free if few else [], made, noise_at(logs))
+        filtered = model.filtered(values, free if restricted else [], made, noise_at(logs))
         value = -sum(drive_fit.log_likelihood for drive_fit in filtered)
-        if few:
+        if restricted:
             scaled = stacked(filtered, len(free))[1] * model.scales[[*free]]
             value += 0.5 * float(np.linalg.slogdet(scaled.T @ scaled + np.eye(len(free)))[1])
         return value
 
-    bounds = [(math.log(getattr(LEAST, name)), math.log(getattr(MOST, name))) for name in sought]
+    bounds = [(math.log(getattr(least, name)), math.log(getattr(MOST, name))) for name in sought]
     start = np.array(
         [
             math.log(min(max(getattr(first, name), 2.0 * getattr(LEAST, name)), 0.5 * getattr(MOST, name)))
