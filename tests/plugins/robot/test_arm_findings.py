@@ -68,7 +68,8 @@ EXAMPLES: list[tuple[str, dict[str, Any], str]] = [
      "of 15 samples that were not learned from, 10 are off as no noise explains, half of all 3.8 times as "
      "far as the first ones leave: a joint slipped, what sees was knocked, or the first show too little"),
     ("looks_few", {"count": 3, "of": 12, "few": 6},
-     "in 3 postures of 12 what is seen comes fewer than 6 times: whether it stands there is hardly to be told"),
+     "in 3 postures of 12 what is seen comes fewer than 6 times: whether it stands there is hardly to be "
+     "told"),
     ("stamps_apart", {"topic": "/marker", "s": 0.512},
      "stamps of /marker and of the joint states are 0.51 s apart, by when they came: it is slow to come, or "
      "clocks are apart"),
