@@ -259,6 +259,7 @@ def test_a_camera_follows_the_robot_that_a_hand_leads(window: Window, setup: Sce
 def test_the_line_behind_the_hand_is_in_the_legend(window: Window, setup: ScenarioSetup) -> None:
     with driven(setup) as url:
         page = opened(window, url)
+        page.set_viewport_size({"width": 900, "height": 600})  # low windows leave it out
         entry = page.get_by_role("button", name="the last 30 s of ee")
         shown = "nmm.node('/nmm/trail 0').visible"
         assert entry.get_attribute("aria-pressed") == "true"
@@ -271,6 +272,8 @@ def test_a_ring_under_the_hand_moves_no_camera(window: Window, setup: ScenarioSe
     """Its angle would change without the hand; nor does a hand in the middle of the picture."""
     with driven(setup) as url:
         page = opened(window, url)
+        page.set_viewport_size({"width": 900, "height": 600})  # in low windows the robot is small
+        page.evaluate("nmm.camera.reset()")
         arrived(page)
         seen = "nmm.viewer.controls.target.toArray()"
         for hand, moves in (
@@ -282,8 +285,12 @@ def test_a_ring_under_the_hand_moves_no_camera(window: Window, setup: ScenarioSe
               nmm.camera.freeze(true, {hand});
               const before = {seen};
               const root = nmm.node(nmm.motions[0].root);
-              root.position.x += 5;
-              root.matrix.elements[12] += 5;
+              // To the right in the picture: three.js has y upwards, robots z.
+              const right = nmm.viewer.camera.matrixWorld.elements;
+              root.position.x += 5 * right[0];
+              root.position.y -= 5 * right[2];
+              root.matrix.elements[12] += 5 * right[0];
+              root.matrix.elements[13] -= 5 * right[2];
               nmm.camera.update();
               const after = {seen};
               nmm.camera.freeze(false);
