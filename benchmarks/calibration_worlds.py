@@ -88,8 +88,16 @@ def skid_steer(rng: np.random.Generator, grip: float = 8.0, stiff: float = 0.001
     more = f"<equality>{''.join(gears)}</equality>"
     counted = [*names, *(f"{name}_slip" for name in names)]
     xml = mjcf("".join(parts), driven(*names[:2]), counted, more, names, grip, stiff)
-    rates = lambda u: np.tile(wheel_speeds(u), 2)  # noqa: E731 - of World
-    return World(robot, truth, xml, names, both_ways, wheel_speeds, rates, of_tyres(names))
+    return World(
+        robot,
+        truth,
+        xml,
+        names,
+        both_ways,
+        wheel_speeds,
+        lambda u: np.tile(wheel_speeds(u), 2),
+        of_tyres(names),
+    )
 
 
 def of_tyres(names: Sequence[str]) -> Callable[[Mapping[str, Array]], dict[str, Array]]:
@@ -140,8 +148,9 @@ def car(rng: np.random.Generator) -> World:
     truth = {f"radius.{name}": radius for name, radius in radii.items()}
     truth |= {"wheelbase": base, "track": track, "offset.steering": offset, "ratio.steering": ratio}
     xml = mjcf("".join(parts), actuators, [*names, *steered], tendon, names)
-    rates = lambda u: np.tile(u[:, :1] / 0.12, 4)  # noqa: E731 - of World
-    return World(robot, truth, xml, names, steering, commands, rates, readings)
+    return World(
+        robot, truth, xml, names, steering, commands, lambda u: np.tile(u[:, :1] / 0.12, 4), readings
+    )
 
 
 def half_before(values: Array) -> Array:
@@ -190,8 +199,9 @@ def mecanum(rng: np.random.Generator) -> World:
         return {name: turned[name] - seen["slips"][:, i] for i, name in enumerate(names)}
 
     truth = {f"radius.{name}": radius for name, radius in radii.items()} | {"half_length_plus_width": x + y}
-    rates = lambda u: math.sqrt(2.0) * commands(u)  # noqa: E731 - of World
-    return World(robot, truth, xml, names, all_ways, commands, rates, readings)
+    return World(
+        robot, truth, xml, names, all_ways, commands, lambda u: math.sqrt(2.0) * commands(u), readings
+    )
 
 
 def all_ways(t: Array, rng: np.random.Generator) -> Array:
@@ -226,8 +236,16 @@ def tractor(rng: np.random.Generator) -> World:
         return (u[:, :1] + u[:, 1:] * [[-0.22, 0.22]]) / 0.1
 
     xml = mjcf("".join(parts), driven(*names), counted, slipping=[*names, *rolling_wheels])
-    rates = lambda u: np.tile(commands(u), 2)  # noqa: E731 - of World
-    return World(robot, truth, xml, [*names, *rolling_wheels], ahead, commands, rates, picked(*counted))
+    return World(
+        robot,
+        truth,
+        xml,
+        [*names, *rolling_wheels],
+        ahead,
+        commands,
+        lambda u: np.tile(commands(u), 2),
+        picked(*counted),
+    )
 
 
 PLATFORMS: dict[str, Callable[[np.random.Generator], World]] = {

@@ -123,7 +123,7 @@ def _spread(wheels: list[Wheel], own: float) -> Callable[[RobotChange, float], N
 def _rectangle(main: list[Wheel]) -> Callable[[RobotChange, float], None]:
     def change(draft: RobotChange, value: float) -> None:
         platform = draft.platform
-        assert isinstance(platform, Mecanum)
+        assert isinstance(platform, Mecanum)  # no other has this length
         share = value / (0.5 * (platform.length + platform.width))
         platform.length, platform.width = share * platform.length, share * platform.width
         draft.scale(main, share, share)
@@ -143,7 +143,7 @@ def _centre(name: str, main: list[Wheel]) -> Callable[[RobotChange, float], None
 def _wheelbase(counted: list[Wheel]) -> Callable[[RobotChange, float], None]:
     def change(draft: RobotChange, value: float) -> None:
         platform = draft.platform
-        assert isinstance(platform, Car | FrontDriveCar)
+        assert isinstance(platform, Car | FrontDriveCar)  # likewise
         by = value - platform.wheelbase
         platform.wheelbase = value
         draft.move(platform.steering, by)
@@ -170,7 +170,7 @@ def _of_trailers(platform: Tractor) -> Iterator[tuple[str, Length]]:
 def _trailer(number: int, key: str) -> Callable[[RobotChange, float], None]:
     def change(draft: RobotChange, value: float) -> None:
         platform = draft.platform
-        assert isinstance(platform, Tractor)
+        assert isinstance(platform, Tractor)  # likewise
         trailers = [*platform.trailers]
         by = value - getattr(trailers[number], key)
         trailers[number] = replace(trailers[number], **{key: value})  # type: ignore[arg-type]  # of the name

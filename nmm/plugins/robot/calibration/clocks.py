@@ -89,8 +89,8 @@ def stamped_alike(shares: Array, alike: Array) -> float:
 def likeness(counters: Counters, drive: RobotDrive) -> tuple[Array, Array]:
     """Shares (S,) by which the reference's clock may run fast, and how well the speeds of wheels and
     reference go together (S,), at the best delay of each: Pearson's r of what they have in common, by the
-    share of the wheels' changes of speed that is in it."""
-    begin, end = max(drive.t[0], drive.at[0]), min(drive.t[-1], drive.at[-1])  # else a slow clock sees more
+    share of the wheels' changes of speed that is in it, of those while the reference looked."""
+    begin, end = max(drive.t[0], drive.at[0]), min(drive.t[-1], drive.at[-1])
     seconds = max(float(end - begin), 0.0)
     step = max(LEAST_STEP, seconds / TIMES)
     times = begin + step * np.arange(int(seconds / step) + 1)

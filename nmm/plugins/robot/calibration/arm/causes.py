@@ -109,7 +109,7 @@ def _w_first(M: Array) -> Array:
 
 def _half_turn(log: Sightings) -> Array:
     """Where a board (4, 4) is in its own axes whose corners are told from the last to the first."""
-    assert log.board is not None
+    assert log.board is not None  # it has corners: `Sightings` asks for it
     return placed(np.array([*(log.board[0] + log.board[-1])[:2], 0.0, 0.0, 0.0, np.pi]))
 
 
@@ -142,7 +142,7 @@ def _angles(R: Array, others: Array) -> Array:
 
 def _unlike(log: Sightings, seen: Array) -> str:
     """What board was expected, where this one does not fit to single pictures; "" where it does."""
-    assert log.camera is not None
+    assert log.camera is not None  # likewise
     off = _pixels(log, seen)
     if off < UNLIKE * log.camera.fx:
         return ""
@@ -166,7 +166,7 @@ def _pixels(log: Sightings, seen: Array) -> float:
 
 def _other_way(log: Sightings) -> Sightings | None:
     """Of a board with columns and rows the one with these the other way round; None of any other."""
-    assert log.board is not None
+    assert log.board is not None  # it has corners: `Sightings` asks for it
     x, y = (np.unique(log.board[:, axis].round(9)) for axis in (0, 1))
     if len(x) * len(y) != len(log.board) or len(x) == len(y) or log.board[:, 2].any():
         return None

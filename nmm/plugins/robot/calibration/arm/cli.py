@@ -103,7 +103,7 @@ class SightingOptions:
     def _read_table(self, file: str, robot: Robot, keywords: Mapping[str, Any]) -> Sightings:
         from nmm.plugins.robot.calibration.arm.sightings import WORLD, Sightings
 
-        assert self.on is not None
+        assert self.on is not None  # `asked` has said so
         for name in ("time", "reference_time", "shift"):
             if name in keywords:
                 where = f"--{name.replace('_', '-')}"
@@ -115,7 +115,7 @@ class SightingOptions:
     def _read_bag(self, file: str, robot: Robot, keywords: Mapping[str, Any]) -> Sightings:
         from nmm.plugins.robot.calibration.arm.sightings import WORLD, Sightings
 
-        assert self.on is not None
+        assert self.on is not None  # `asked` has said so
         for name in ("camera", "board"):
             if getattr(self, name) is not None:
                 expected = "poses of what a camera sees, or corners in a table"
