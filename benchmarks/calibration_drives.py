@@ -28,7 +28,10 @@ Inputs = Callable[[Array, np.random.Generator], Array]
 
 
 def simulated(world: World, u: Array, rng: np.random.Generator, noise: bool = True) -> dict[str, Array]:
-    """Sensors by name, (N, ...) at each step, of inputs (N, p) at each step of MuJoCo, and `slips` (N, w)."""
+    """Sensors by name, (N, ...) at each step, of inputs (N, p) at each step of MuJoCo, and `slips` (N, w).
+
+    Raises RuntimeError where MuJoCo warns, as of a motion that is not stable: it is no truth.
+    """
     model = mujoco.MjModel.from_xml_string(world.xml)
     data, rates = mujoco.MjData(model), np.abs(world.rates(u))
     each = SLIP * np.sqrt(rates[::READ] * STEP * READ) * rng.normal(size=rates[::READ].shape) * noise
@@ -45,7 +48,16 @@ def simulated(world: World, u: Array, rng: np.random.Generator, noise: bool = Tr
     mujoco.mj_getState(model, data, begin, whole)
     spec = mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_XFRC_APPLIED
     told = np.concatenate([world.controls(u, slips), pushes.reshape(len(u), -1)], axis=1)
-    _, seen = mujoco.rollout.rollout(model, data, begin[np.newaxis], told[np.newaxis], control_spec=int(spec))
+    warned: list[str] = []
+    mujoco.set_mju_user_warning(warned.append)  # else MuJoCo writes into a file in the working directory
+    try:
+        _, seen = mujoco.rollout.rollout(
+            model, data, begin[np.newaxis], told[np.newaxis], control_spec=int(spec)
+        )
+    finally:
+        mujoco.set_mju_user_warning(None)
+    if warned:
+        raise RuntimeError(f"MuJoCo: {warned[0]}")
     found: dict[str, Any] = {"slips": slips}
     for i in range(model.nsensor):
         first, many = model.sensor_adr[i], model.sensor_dim[i]
