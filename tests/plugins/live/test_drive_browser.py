@@ -256,6 +256,21 @@ def test_a_camera_follows_the_robot_that_a_hand_leads(window: Window, setup: Sce
         np.testing.assert_allclose(target(page), held, atol=1e-9)  # where it was dropped
 
 
+def test_a_low_window_has_the_robot_near_enough_to_be_seen(window: Window, setup: ScenarioSetup) -> None:
+    far = "nmm.viewer.camera.position.distanceTo(nmm.viewer.controls.target)"
+    with driven(setup) as url:
+        page = opened(window, url)
+        found = []
+        for width, height in ((900, 600), (480, 300)):
+            page.set_viewport_size({"width": width, "height": height})
+            draw_frames(page)
+            page.evaluate("nmm.camera.reset()")
+            found.append(page.evaluate(far))
+        assert found[1] < 2.5 * found[0]
+        height = page.evaluate("document.querySelector('#heading h1').clientHeight")
+        assert height < 25.0  # one line
+
+
 def test_the_line_behind_the_hand_is_in_the_legend(window: Window, setup: ScenarioSetup) -> None:
     with driven(setup) as url:
         page = opened(window, url)
@@ -272,8 +287,6 @@ def test_a_ring_under_the_hand_moves_no_camera(window: Window, setup: ScenarioSe
     """Its angle would change without the hand; nor does a hand in the middle of the picture."""
     with driven(setup) as url:
         page = opened(window, url)
-        page.set_viewport_size({"width": 900, "height": 600})  # in low windows the robot is small
-        page.evaluate("nmm.camera.reset()")
         arrived(page)
         seen = "nmm.viewer.controls.target.toArray()"
         for hand, moves in (

@@ -68,7 +68,7 @@
     const seen = boxOf("sights"); // what cameras see: at the left edge above the bar, or at the upper right
     const narrow = tools.top > 0.5 * view.clientHeight; // the tools are below
     const lowest = Math.min(bar.height ? bar.top : Infinity, narrow && tools.height ? tools.top : Infinity, view.clientHeight);
-    const bottom = view.clientHeight - lowest + (bar.height ? 10 : view.clientHeight < window.innerHeight ? 56 : 24);
+    const bottom = view.clientHeight - lowest + (bar.height || narrow ? 10 : view.clientHeight < window.innerHeight ? 56 : 24);
     if (narrow && seen.width) return [[seen.bottom + 4, bottom, 0, 0], [head.bottom + 4, bottom, 0, view.clientWidth - seen.left + 4]];
     if (narrow) return [[head.bottom + 4, bottom, 0, 0]];
     if (camera.held) return [[Math.max(head.bottom, tools.bottom) + 4, bottom, 0, 0]];
@@ -156,7 +156,10 @@
     const half = tangent(eye.fov);
     const share = (length, taken) => Math.max(0.1, 1 - (2 * taken) / length);
     const [west, east] = [left, right].map((side) => ((half * width) / height) * Math.min(0.94, share(width, side)));
-    const [above, below] = [top, bottom].map((end) => half * share(height, end));
+    const free = [top, bottom].map((end) => share(height, end));
+    // Cards that leave less than a third of a low window have some of it behind them: it would be too far to see.
+    const behind = Math.max(0, 1 / 3 - 0.5 * (free[0] + free[1]));
+    const [above, below] = free.map((end) => half * (end + behind));
     let [x0, x1, y0, y1, near] = [-Infinity, Infinity, -Infinity, Infinity, Infinity];
     for (let i = 0; i < zs.length; i++) {
       x0 = Math.max(x0, xs[i] - east * zs[i]);
