@@ -230,8 +230,8 @@ from .motion.verdict import Verdict as Verdict
 from .motion.verdict import verdict_of as verdict_of
 from .plugins.robot.calibration.arm.calibration import SightingNoise as SightingNoise
 from .plugins.robot.calibration.arm.judged import ArmHeldOut as ArmHeldOut
+from .plugins.robot.calibration.filtered import DriveNoise as DriveNoise
 from .plugins.robot.calibration.judged import HeldOut as HeldOut
-from .plugins.robot.calibration.model import DriveNoise as DriveNoise
 from .plugins.sweeps import SweepResult as SweepResult
 from .plugins.sweeps.rollout import Rollouts as Rollouts
 from .scenario.keys import at as at

@@ -27,12 +27,13 @@ from nmm.plugins.robot.calibration.drives import (
     first_delay,
     used_looks,
 )
+from nmm.plugins.robot.calibration.filtered import DriveNoise
 from nmm.plugins.robot.calibration.fit import Fit, fit
 from nmm.plugins.robot.calibration.held import asked_to_hold, held_delay, held_numbers
 from nmm.plugins.robot.calibration.judged import HeldOut, held_out, whiteness
 from nmm.plugins.robot.calibration.kept import Hold, file_of
 from nmm.plugins.robot.calibration.mixed_up import check_mixed_up
-from nmm.plugins.robot.calibration.model import DriveNoise, Model
+from nmm.plugins.robot.calibration.model import Model
 from nmm.plugins.robot.calibration.mounting import check_mounting
 from nmm.plugins.robot.calibration.parameters import CLOCK, LearnedNumber
 from nmm.scenario.calibration_file import CalibrationFile

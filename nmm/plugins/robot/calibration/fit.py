@@ -14,7 +14,8 @@ from scipy.optimize import minimize
 from nmm.base.arrays import Array
 from nmm.base.errors import InputError
 from nmm.plugins.robot.calibration import shown
-from nmm.plugins.robot.calibration.model import DriveNoise, Filtered, Model
+from nmm.plugins.robot.calibration.filtered import DriveNoise, Filtered
+from nmm.plugins.robot.calibration.model import Model
 from nmm.plugins.robot.calibration.parameters import CLOCK, DELAY
 from nmm.plugins.robot.calibration.screening import SCREENS, begin_again, plain_jumps, rejoin, screened
 

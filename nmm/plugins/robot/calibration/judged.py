@@ -12,9 +12,10 @@ from scipy import stats
 
 from nmm.base.arrays import Array
 from nmm.plugins.robot.calibration.drives import path
+from nmm.plugins.robot.calibration.filtered import Filtered
 from nmm.plugins.robot.calibration.fit import Fit, fit
 from nmm.plugins.robot.calibration.innovations import BEGINS, TAKEN
-from nmm.plugins.robot.calibration.model import Filtered, Model
+from nmm.plugins.robot.calibration.model import Model
 from nmm.plugins.robot.calibration.planar import along_body, composed, placed
 
 #: Which part of a drive is learned from, for the other to be predicted.

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
 from nmm.base.arrays import Array
 from nmm.base.kernels.compiled import checked_by_caller
 from nmm.model.robots.numbers import robot_numbers, with_numbers
-from nmm.model.robots.origins import arm_joints
 from nmm.model.robots.robot import Robot
 from nmm.plugins.robot.calibration.drives import RobotDrive, path
+from nmm.plugins.robot.calibration.filtered import DriveNoise, Filtered
 from nmm.plugins.robot.calibration.innovations import BEGINS, INNOVATIONS, TAKEN, innovations
-from nmm.plugins.robot.calibration.parameters import CLOCK, DELAY, MOUNT, Learned, learned
+from nmm.plugins.robot.calibration.learnable import learnable
+from nmm.plugins.robot.calibration.parameters import CLOCK, DELAY, MOUNT
 from nmm.plugins.robot.calibration.planar import alignment, along_body
-from nmm.plugins.robot.calibration.sides import SideRows, Slopes, agreement, following
+from nmm.plugins.robot.calibration.sides import Slopes, agreement, following
 from nmm.plugins.robot.calibration.stretches import SIDES, Stretches, steps_between, stretches
 from nmm.plugins.robot.counted_motion import Counted
 from nmm.plugins.robot.odometry import Counters
@@ -30,66 +29,7 @@ CLOSED = 0.05
 #: A drive's first heading is that of so many m of positions, or of thirty times their noise.
 SEEN = 2.0
 
-
-class DriveNoise(NamedTuple):
-    """Standard deviations: of the reference's place, m, and heading, rad; of each counter for a rad (or m) of
-    it, rad; across for a metre of the way, m; of the turn for a rad of it, rad; of how counters that are more
-    than inputs agree, for a rad (or m) of them, rad; of how hitches follow from look to look, rad; of the
-    times of looks beside the counters', s.
-
-    Examples
-    --------
-    >>> nmm.extending.DriveNoise(0.003, 0.003, 0.01, 1e-4, 2e-3, 2e-3, 1e-4, 1e-3).place
-    0.003
-    """
-
-    place: float
-    heading: float
-    counters: float
-    across: float
-    turns: float
-    agreement: float
-    following: float
-    jitter: float
-
-
 Made = tuple[Stretches, Slopes]
-
-
-@dataclass(eq=False)
-class Filtered:
-    """Of a drive: w (M, r) and W (M, r, n), S (M, r), poses (M, 3) as `innovations` tells; the rows taken;
-    what counters say beyond motions, and how hitches follow."""
-
-    w: Array
-    W: Array
-    S: Array
-    poses: Array
-    taken: Array
-    agreement: SideRows
-    following: SideRows
-
-    @property
-    def log_likelihood(self) -> float:
-        w, S = self.w[self.taken], self.S[self.taken]
-        total = np.sum(w * w + np.log(S))
-        for part in (self.agreement, self.following):
-            total += part.over @ part.over + part.logarithms
-        return float(-0.5 * total)
-
-    def without_slopes(self) -> Filtered:
-        """The same, with less memory."""
-        sides = [
-            part._replace(slopes=np.zeros((0, 0)), weights=np.zeros(0))
-            for part in (self.agreement, self.following)
-        ]
-        return replace(self, W=np.zeros((0, 0, 0)), agreement=sides[0], following=sides[1])
-
-    @property
-    def count(self) -> int:
-        """How many numbers are free to be off."""
-        looks = int(np.count_nonzero(self.taken)) * self.w.shape[1]
-        return looks + self.agreement.free + self.following.free
 
 
 class Model:
@@ -100,7 +40,7 @@ class Model:
 
     def __init__(self, robot: Robot, counters: Counters, drives: Sequence[RobotDrive]) -> None:
         self.robot, self.counters, self.drives = robot, counters, [*drives]
-        self.learned = _learnable(robot, counters, self.drives)
+        self.learned = learnable(robot, counters, self.drives)
         self.first = np.array([number.value for number in self.learned])
         self.scales = np.array([number.plausible for number in self.learned])
         self._own_names = {*robot_numbers(robot)}
@@ -322,29 +262,3 @@ def _scaled(table: Array, column: int, by: float, more: float) -> Array:
     made = table.copy()
     made[:, column] = by * made[:, column] + more
     return made
-
-
-def _learnable(robot: Robot, counters: Counters, drives: Sequence[RobotDrive]) -> list[Learned]:
-    known = robot_numbers(robot)
-    found = []
-    for name in counters.names:
-        if f"radius.{name}" in known:
-            found.append(learned(f"radius.{name}", "m", known[f"radius.{name}"].value))
-    for name in counters.names:
-        if name in robot.platform.inputs:
-            found.append(learned(f"scale.{name}", "1", 1.0))
-    unseen = {*arm_joints(robot)}  # wheels do not show an arm's numbers, nor where frames are
-    for name, number in known.items():
-        if number.kind in ("radius", "origin") or number.of in unseen:
-            continue
-        if number.kind == "hitch" and not all(drive.hitches for drive in drives):
-            continue
-        found.append(learned(name, number.unit, number.value))
-    looked = [drive.rows for drive in drives if not drive.ends]
-    if looked:
-        found += [learned(name, "m" if name != MOUNT[2] else "rad", 0.0) for name in MOUNT[: max(looked)]]
-    for drive in drives:
-        if not drive.ends:
-            more = f".{drive.number}" if drive.number else ""
-            found += [learned(DELAY + more, "s", drive.delay), learned(CLOCK + more, "1", 0.0)]
-    return found

@@ -6,8 +6,9 @@ import numpy as np
 
 from nmm.base.arrays import Array
 from nmm.plugins.robot.calibration.drives import RobotDrive
+from nmm.plugins.robot.calibration.filtered import DriveNoise
 from nmm.plugins.robot.calibration.innovations import BEGINS, LEFT_OUT, TAKEN
-from nmm.plugins.robot.calibration.model import DriveNoise, Model
+from nmm.plugins.robot.calibration.model import Model
 from nmm.plugins.robot.calibration.twists import untwisted
 
 #: Innovations beyond so many standard deviations are outliers, looked for so many times.
