@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -58,6 +59,16 @@ def test_drives_in_mujoco_without_noise_show_the_numbers_of_its_file(platform: s
         assert number.after == pytest.approx(true, rel=0.0, abs=near), name
     assert found.numbers["delay"].after == pytest.approx(reference["delay"], abs=2e-4)
     assert found.numbers["reference.x"].after == pytest.approx(reference["reference.x"], abs=5e-4)
+
+
+def test_a_drive_that_mujoco_warns_of_is_no_truth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And it leaves no file, which MuJoCo else writes where it runs."""
+    monkeypatch.chdir(tmp_path)
+    rng = np.random.default_rng(0)
+    world = calibration_worlds.PLATFORMS["differential"](rng)
+    with pytest.raises(RuntimeError, match=r"MuJoCo: .*unstable"):
+        calibration_drives.drive(world, 2.0, rng, inputs=lambda t, _: np.full((len(t), 2), 1e12))
+    assert [*tmp_path.iterdir()] == []
 
 
 def test_a_run_of_the_table_is_read_again(tmp_path: object) -> None:
