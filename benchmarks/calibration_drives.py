@@ -48,6 +48,7 @@ def simulated(world: World, u: Array, rng: np.random.Generator, noise: bool = Tr
     mujoco.mj_getState(model, data, begin, whole)
     spec = mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_XFRC_APPLIED
     told = np.concatenate([world.controls(u, slips), pushes.reshape(len(u), -1)], axis=1)
+    told = np.repeat(told, world.substeps, axis=0)
     warned: list[str] = []
     mujoco.set_mju_user_warning(warned.append)  # else MuJoCo writes into a file in the working directory
     try:
@@ -61,15 +62,16 @@ def simulated(world: World, u: Array, rng: np.random.Generator, noise: bool = Tr
     found: dict[str, Any] = {"slips": slips}
     for i in range(model.nsensor):
         first, many = model.sensor_adr[i], model.sensor_dim[i]
-        part = seen[0, :, first : first + many]
+        part = seen[0, :: world.substeps, first : first + many]
         found[model.sensor(i).name] = part[:, 0] if many == 1 else part
     return found
 
 
-def along_means(places: Array, headings: Array) -> Array:
-    """Places (N, 2) whose steps are turned by half of a step's turn, headings (N,): MuJoCo's are along the
-    heading where a step begins, and leave an arc by half a step of its way."""
-    half = 0.5 * np.diff(headings)
+def along_means(places: Array, headings: Array, substeps: int = 1) -> Array:
+    """Places (N, 2) whose steps are turned by half of a turn of MuJoCo's step, of which so many are one of
+    headings (N,): MuJoCo's are along the heading where a step begins, and leave an arc by half a step of its
+    way."""
+    half = 0.5 * np.diff(headings) / substeps
     x, y = np.diff(places, axis=0).T
     steps = np.stack([np.cos(half) * x - np.sin(half) * y, np.sin(half) * x + np.cos(half) * y], axis=1)
     return places[0] + np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
@@ -87,7 +89,7 @@ def drive(
     mount = np.array([rng.uniform(-0.2, 0.3), rng.uniform(-0.15, 0.15), rng.uniform(-0.3, 0.3)])
     heading = np.unwrap(np.arctan2(seen["ahead"][:, 1], seen["ahead"][:, 0]))
     c, s = np.cos(heading), np.sin(heading)
-    places = along_means(seen["at"][:, :2], heading) + np.stack(
+    places = along_means(seen["at"][:, :2], heading, world.substeps) + np.stack(
         [c * mount[0] - s * mount[1], s * mount[0] + c * mount[1]], axis=1
     )
     looks = np.column_stack([places, heading + mount[2]])[first::LOOK]

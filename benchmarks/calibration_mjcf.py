@@ -15,7 +15,7 @@ import numpy as np
 import nmm
 
 Array = np.ndarray
-#: A step of MuJoCo, s.
+#: A step of a drive, s.
 STEP = 0.002
 #: Friction, and how stiff friction is beside the contact itself (MuJoCo's impratio).
 GRIP, STIFF = 1.0, 100.0
@@ -34,6 +34,7 @@ class World:
         balls, are rates that are added
     inputs : of a driver, at times (N,), with random numbers
     readings : counters by name, of sensors by name (N, ...)
+    substeps : so many steps of MuJoCo are one of a drive
     """
 
     robot: nmm.Robot
@@ -44,6 +45,7 @@ class World:
     commands: Callable[[Array], Array]
     rates: Callable[[Array], Array]
     readings: Callable[[Mapping[str, Array]], dict[str, Array]]
+    substeps: int = 1
 
     def controls(self, u: Array, slips: Array) -> Array:
         """Of inputs (N, p), with wheels that have slipped by (N, w), rad."""
@@ -94,12 +96,14 @@ def mjcf(
     slipping: Sequence[str] = (),
     grip: float = GRIP,
     stiff: float = STIFF,
+    substeps: int = 1,
 ) -> str:
     """The world around the parts of a robot's base."""
     actuators += "".join(f'<position joint="{name}_slip" kp="400" kv="4"/>' for name in slipping)
     sensors = "".join(f'<jointpos name="{name}" joint="{name}"/>' for name in counted)
-    return f"""<mujoco><option timestep="{STEP}" integrator="Euler" cone="elliptic" impratio="{stiff}"/>
-<default><geom solref="{2 * STEP} 1" solimp="0.995 0.995 0.001" contype="1" conaffinity="2"/>
+    step = STEP / substeps
+    return f"""<mujoco><option timestep="{step}" integrator="Euler" cone="elliptic" impratio="{stiff}"/>
+<default><geom solref="{2 * step} 1" solimp="0.995 0.995 0.001" contype="1" conaffinity="2"/>
 <default class="tyre"><geom friction="{grip} 0 0" condim="3" mass="1"/></default>
 <default class="load"><geom contype="0" conaffinity="0"/></default></default>
 <worldbody><geom type="plane" size="0 0 1" condim="1" friction="0.001 0 0" contype="2" conaffinity="1"/>
