@@ -86,7 +86,7 @@ def drive(
     inputs : by default `wander`; rate, looks : of encoders and of the reference, 1/s
     mount : where the reference is on the robot, m, m, rad; delay : of its stamps, s
     place, heading : standard deviations of the reference, m and rad
-    slip : of a wheel for a rad that it turns, rad: the ground sees it, its counter does not
+    slip : of a wheel for a rad that it turns, rad: the ground and hitches see it, its counter does not
     """
     truth = dict(truth or {})
     moves = {n: v for n, v in truth.items() if n.partition(".")[0] not in ("offset", "ratio")}
@@ -95,9 +95,8 @@ def drive(
     counters = Counters(true, dict.fromkeys(names, 0.0), name)
     t = np.arange(round(seconds * rate) + 1) / rate
     u = (inputs or wander(true.platform.p, seed))(0.5 * (t[1:] + t[:-1]))
-    own, counts = _integrated(true, counters, u, 1.0 / rate)
-    slipped = rng.normal(size=(len(t) - 1, len(names))) * slip * np.sqrt(np.abs(np.diff(counts, axis=0)))
-    rolled = counts + np.vstack([np.zeros(len(names)), np.cumsum(slipped, axis=0)])
+    slips = rng.normal(size=(len(t) - 1, len(names))) * slip
+    own, counts, rolled = _integrated(true, counters, u, 1.0 / rate, slips)
     poses = composed(stretches(counters.record, t, rolled, own, t).motions)
     every = round(rate / looks)
     seen = placed(poses[::every], mount)
@@ -109,20 +108,25 @@ def drive(
     return nmm.DriveLog(name, t, readings, t[::every] + delay, seen[:, :columns], kind)  # type: ignore[arg-type]
 
 
-def _integrated(robot: nmm.Robot, counters: Counters, u: Array, dt: float) -> tuple[Array, Array]:
-    """Own joints (N, n_p - 3) and counters (N, k) by inputs (N - 1, p), each for dt, s."""
-    n_p = robot.platform.n_p
+def _integrated(
+    robot: nmm.Robot, counters: Counters, u: Array, dt: float, slips: Array
+) -> tuple[Array, Array, Array]:
+    """Own joints (N, n_p - 3), counters (N, k) and how far they rolled (N, k), by inputs (N - 1, p), each for
+    dt, s, with slips (N - 1, k) for a rad that they count (and with its root)."""
+    n_p, steered = robot.platform.n_p, counters.steered.values()
+    free = [i for i in range(robot.platform.p) if i not in steered]  # steering joints turn as they are told
     qp, own = np.zeros(n_p), np.zeros((len(u) + 1, n_p - 3))
-    if n_p == 3:
-        M = counters.matrix(qp[3:])[0]
-        return own, np.vstack([np.zeros(len(M)), np.cumsum(dt * u @ M.T, axis=0)])
-    turned = np.zeros((len(u) + 1, len(counters.names)))
+    counts, rolled = np.zeros((2, len(u) + 1, len(counters.names)))
     for n, un in enumerate(u):
-        middle = qp + 0.5 * dt * robot.platform.G(qp) @ un
-        turned[n + 1] = turned[n] + dt * counters.matrix(middle[3:])[0] @ un
-        qp = qp + dt * robot.platform.G(middle) @ un
+        M = counters.matrix((qp + 0.5 * dt * robot.platform.G(qp) @ un)[3:])[0]
+        counted = dt * M @ un
+        slipped = slips[n] * np.sqrt(np.abs(counted))
+        counts[n + 1], rolled[n + 1] = counts[n] + counted, rolled[n] + counted + slipped
+        moved = un.copy()
+        moved[free] += np.linalg.lstsq(M[:, free], slipped / dt, rcond=None)[0]
+        qp = qp + dt * robot.platform.G(qp + 0.5 * dt * robot.platform.G(qp) @ moved) @ moved
         own[n + 1] = qp[3:]
-    return own, turned
+    return own, counts, rolled
 
 
 def write(log: nmm.DriveLog, path: Path, *, turn: float = 2.0 * np.pi) -> tuple[Path, Path]:

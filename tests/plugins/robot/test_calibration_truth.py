@@ -82,6 +82,15 @@ def test_a_run_of_the_table_is_read_again(tmp_path: object) -> None:
     assert row[3:5] == (np.mean(np.abs(off) < 2.0), np.mean(off))
 
 
+def test_hitches_that_slipping_wheels_turn_show_lengths_of_trailers_to_a_millimetre() -> None:
+    """Their noise goes with that of the wheels: taken by itself, deviations were six times as large."""
+    numbers = calibration_truth.run("tractor, two trailers", 0)["numbers"]
+    for name, near in (("H1", 4e-4), ("L1", 2e-3), ("H2", 2e-3), ("L2", 1e-3)):
+        true, after, deviation = numbers[name]
+        assert deviation < near, name
+        assert after == pytest.approx(true, abs=4.0 * deviation), name
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("platform", calibration_worlds.PLATFORMS)
 def test_deviations_hold_in_mujoco_as_often_as_they_claim(platform: str) -> None:

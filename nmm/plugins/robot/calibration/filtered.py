@@ -14,8 +14,8 @@ from nmm.plugins.robot.calibration.sides import SideRows
 class DriveNoise(NamedTuple):
     """Standard deviations: of the reference's place, m, and heading, rad; of each counter for a rad (or m) of
     it, rad; across for a metre of the way, m; of the turn for a rad of it, rad; of how counters that are more
-    than inputs agree, for a rad (or m) of them, rad; of how hitches follow from look to look, rad; of the
-    times of looks beside the counters', s.
+    than inputs agree, for a rad (or m) of them, rad; of what hitches turn by themselves from look to look,
+    rad; of the times of looks beside the counters', s.
 
     Examples
     --------
@@ -36,7 +36,7 @@ class DriveNoise(NamedTuple):
 @dataclass(eq=False)
 class Filtered:
     """Of a drive: w (M, r) and W (M, r, n), S (M, r), poses (M, 3) as `innovations` tells; the rows taken;
-    what counters say beyond motions, and how hitches follow."""
+    what counters say beyond motions, and hitches beyond what they tell of them."""
 
     w: Array
     W: Array

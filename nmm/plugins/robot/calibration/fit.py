@@ -19,7 +19,8 @@ from nmm.plugins.robot.calibration.model import Model
 from nmm.plugins.robot.calibration.parameters import CLOCK, DELAY
 from nmm.plugins.robot.calibration.screening import SCREENS, begin_again, plain_jumps, rejoin, screened
 
-#: What is taken for noise at first, and the range in which it is sought.
+#: What is taken for noise at first, and the range in which it is sought. (What hitches turn by themselves is
+#: at least about what steps of an encoder of 16 bits are.)
 FIRST = DriveNoise(
     place=0.01,
     heading=0.02,
@@ -37,7 +38,7 @@ LEAST = DriveNoise(
     across=1e-4,
     turns=1e-4,
     agreement=2e-3,
-    following=1e-4,
+    following=5e-5,
     jitter=1e-5,
 )
 #: Of where drives end: how well a robot is put on its marks, m and rad, and its slip.
@@ -54,8 +55,6 @@ FEW, FEW_AT_LAST = 100, 400
 SMALL, STEPS = 0.02, 25
 #: They also end when twice the logarithm of the likelihood gains less.
 ENOUGH = 1e-3
-#: A hitch's noise is no smaller a share of that of all.
-LEAST_SHARE = 0.02
 #: Rows that are factorised at once.
 ROWS = 2048
 
@@ -101,6 +100,7 @@ def fit(
             values = solve(model, values, sought, level, prior=PRIOR)
             if turn == 0 and plain_jumps(model, values, level):
                 values = solve(model, values, sought, level, prior=PRIOR)
+            model.put_beside(values)
             level = noise_of(model, values, sought, level)
             if turn == 1:
                 rejoin(model, values, level)
@@ -123,6 +123,7 @@ def fit(
         progress(f"least squares, {turn + 1} of 2")
         values = solve(model, values, free, level)
         if like is None:
+            model.put_beside(values)
             level = noise_of(model, values, free, level, FEW_AT_LAST if turn else FEW)
     values = solve(model, values, free, level)
     filtered = model.filtered(values, free, model.stretched(values, free), level)
@@ -200,15 +201,15 @@ def solve(
     scales = model.scales[free]
     pull = np.diag(1.0 / (prior * scales)) if prior else np.zeros((0, len(free)))
 
-    def cost_of(at: Array) -> tuple[float, Array, Array]:
-        filtered = model.filtered(at, free, model.stretched(at, free), noise)
-        w, W = stacked(filtered, len(free))
+    def cost_of(at: Array) -> float:
         off = pull @ (at - model.first)[free]
-        likelihood = sum(drive_fit.log_likelihood for drive_fit in filtered)
-        return -2.0 * likelihood + off @ off, np.concatenate([w, off]), W
+        filtered = model.filtered(at, [], model.stretched(at, []), noise)
+        return float(off @ off) - 2.0 * sum(drive_fit.log_likelihood for drive_fit in filtered)
 
-    cost, w, W = cost_of(values)
+    cost = cost_of(values)
     for _ in range(steps):
+        w, W = stacked(model.filtered(values, free, model.stretched(values, free), noise), len(free))
+        w = np.concatenate([w, pull @ (values - model.first)[free]])
         step = -scales * np.linalg.lstsq(np.concatenate([W, pull]) * scales, w, rcond=1e-12)[0]
         step *= min(1.0, 1.0 / np.max(np.abs(step) / (3.0 * scales)))
         if float(np.sum((W @ step) ** 2)) < SMALL**2:
@@ -217,14 +218,13 @@ def solve(
             trial = values.copy()
             trial[free] += step
             with suppress(InputError):  # a length below zero
-                new, *ahead = cost_of(trial)
+                new = cost_of(trial)
                 if new < cost:  # not so for a number that is none
                     break
             step = 0.5 * step
         else:
             break
         values, gained, cost = trial, cost - new, new
-        w, W = ahead
         if gained < ENOUGH:
             break
     return values
@@ -246,11 +246,12 @@ def noise_of(
         level = min(first.agreement * math.sqrt(square / spare), MOST.agreement)
         first = first._replace(agreement=max(level, LEAST.agreement))
         least = LEAST._replace(counters=max(level, LEAST.counters))
-    first = _of_hitches(model, as_before, first)
     looked = model.with_looks
     sought = ["counters", *(["place", "across", "turns", "jitter"] if looked else [])]
     if any(drive.rows == 3 for drive in looked):
         sought.append("heading")
+    if any(drive.hitches for drive in model.drives):
+        sought.append("following")
     if not looked:
         first = first._replace(**OF_ENDS)
     count = sum(np.count_nonzero(drive_fit.taken) * drive_fit.w.shape[1] for drive_fit in as_before)
@@ -279,24 +280,6 @@ def noise_of(
     options: Any = {"maxiter": 40, "eps": 1e-4, "ftol": 1e-7}
     fitted = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options=options)
     return noise_at(fitted.x)
-
-
-def _of_hitches(model: Model, filtered: Sequence[Filtered], first: DriveNoise) -> DriveNoise:
-    """With the noise of how hitches follow; each hitch's share of it is kept by the model: the first is
-    turned by what wheels slip, the next ones by less."""
-    squares, counts = np.zeros(len(model.hitch_shares)), np.zeros(len(model.hitch_shares))
-    for drive, drive_fit in zip(model.drives, filtered, strict=True):
-        if drive.hitches:
-            over = drive_fit.following.over.reshape(-1, len(drive.hitches))
-            squares[drive.hitches] += np.sum((over * model.hitch_shares[drive.hitches]) ** 2, axis=0)
-            counts[drive.hitches] += len(over)
-    if not squares.any():
-        return first
-    mean, known = math.sqrt(squares.sum() / counts.sum()), counts > 0.0
-    shares = np.sqrt(squares[known] / counts[known]) / mean
-    model.hitch_shares[known] = np.maximum(shares, LEAST_SHARE)
-    level = first.following * mean
-    return first._replace(following=min(max(level, LEAST.following), MOST.following))
 
 
 def hidden(model: Model, values: Array, free: Sequence[int], noise: DriveNoise) -> dict[int, list[int]]:

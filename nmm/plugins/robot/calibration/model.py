@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,11 +14,12 @@ from nmm.model.robots.numbers import robot_numbers, with_numbers
 from nmm.model.robots.robot import Robot
 from nmm.plugins.robot.calibration.drives import RobotDrive, path
 from nmm.plugins.robot.calibration.filtered import DriveNoise, Filtered
+from nmm.plugins.robot.calibration.hitches import Slipping, ToldMotions, slipping, told_by_hitches
 from nmm.plugins.robot.calibration.innovations import BEGINS, INNOVATIONS, TAKEN, innovations
 from nmm.plugins.robot.calibration.learnable import learnable
 from nmm.plugins.robot.calibration.parameters import CLOCK, DELAY, MOUNT
 from nmm.plugins.robot.calibration.planar import alignment, along_body
-from nmm.plugins.robot.calibration.sides import Slopes, agreement, following
+from nmm.plugins.robot.calibration.sides import NOTHING, Slopes, agreement
 from nmm.plugins.robot.calibration.stretches import SIDES, Stretches, steps_between, stretches
 from nmm.plugins.robot.counted_motion import Counted
 from nmm.plugins.robot.odometry import Counters
@@ -42,11 +44,10 @@ class Model:
         self.robot, self.counters, self.drives = robot, counters, [*drives]
         self.learned = learnable(robot, counters, self.drives)
         self.first = np.array([number.value for number in self.learned])
+        self._beside, self._slips = self.first, dict[RobotDrive, Slipping]()
         self.scales = np.array([number.plausible for number in self.learned])
         self._own_names = {*robot_numbers(robot)}
         self._records: dict[tuple[float, ...], Counted] = {}
-        #: Of each own joint, its noise as a share of `DriveNoise.following`.
-        self.hitch_shares = np.ones(robot.platform.n_p - 3)
         self._last: tuple[bytes, list[int], list[Made]] | None = None
         self._filter = checked_by_caller(innovations, INNOVATIONS)
 
@@ -84,12 +85,12 @@ class Model:
     def of(self, drives: Sequence[RobotDrive]) -> Model:
         """The model of other drives."""
         made = copy.copy(self)
-        made.drives, made._last = [*drives], None
+        made.drives, made._last, made._slips = [*drives], None, {}
         return made
 
     def take(self, drives: Sequence[RobotDrive]) -> None:
         """Go on with other drives."""
-        self.drives, self._last = [*drives], None
+        self.drives, self._last, self._slips = [*drives], None, {}
 
     @property
     def begun(self) -> int:
@@ -129,8 +130,9 @@ class Model:
     def _moved(self, values: Array, drive: RobotDrive, whole: bool = True, sides: bool = True) -> Stretches:
         """The stretches of a drive by these numbers, with slopes and noise where whole, and with its sides.
 
-        Sides are of the counters alone, and are told between times by the first delay: between two readings
-        a counter has less noise than at one, and the delay would seem to be whatever puts the looks there."""
+        Sides are of the counters alone, and are told between times by the clock of `put_beside`: between two
+        readings a counter has less noise than at one, and the delay would seem to be whatever puts the looks
+        there."""
         counts, own, at = drive.counts, drive.own, drive.at
         beside = at
         for i, (number, value) in enumerate(zip(self.learned, values.tolist(), strict=True)):
@@ -141,9 +143,10 @@ class Model:
                 offset = float(values[self.index(f"offset.{name}")])
                 own = _scaled(own, self.robot.coordinate(name) - 3, value, offset)
             elif kind == DELAY and name == drive.number and not drive.ends:
-                at, beside = at - value, beside - float(self.first[i])
+                at, beside = at - value, beside - float(self._beside[i])
             elif kind == CLOCK and name == drive.number and not drive.ends:
-                at = at - value * (drive.at - drive.middle)
+                since = drive.at - drive.middle
+                at, beside = at - value * since, beside - float(self._beside[i]) * since
         given = self._record(values), drive.t, counts, own
         steps = steps_between(drive.at)
         some = counts.shape[1] > self.free_inputs or drive.hitches
@@ -154,19 +157,26 @@ class Model:
         return made._replace(**{name: getattr(others, name) for name in SIDES})
 
     def stretched(self, values: Array, free: Sequence[int]) -> list[Made]:
-        """Of each drive its stretches, and their slopes in the free numbers; kept until the next numbers."""
+        """Of each drive its stretches, and their slopes in the free numbers; kept until the next numbers.
+        With hitches they are without noise, which is in `_slipping`."""
         key = values.tobytes()
-        if self._last is None or self._last[0] != key or not {*free} <= {*self._last[1]}:
+        if self._last is None or self._last[0] != key:
             self._last = None  # or memory would hold both
-            self._last = key, [*free], [self._with_slopes(values, free, drive) for drive in self.drives]
-        _, known, found = self._last
+            moved = [(drive, self._moved(values, drive, not drive.hitches)) for drive in self.drives]
+            self._last = key, [], [(made, self._slopes(values, [], drive, made)) for drive, made in moved]
+        _, known, pairs = self._last
+        if not {*free} <= {*known}:
+            pairs = [
+                (made, self._slopes(values, free, drive, made))
+                for drive, (made, _) in zip(self.drives, pairs, strict=True)
+            ]
+            self._last, known = (key, [*free], pairs), [*free]
         if known == [*free]:
-            return found
+            return pairs
         some = [known.index(i) for i in free]
-        return [(made, Slopes(*(part[:, :, some] for part in slopes))) for made, slopes in found]
+        return [(made, Slopes(*(part[:, :, some] for part in slopes))) for made, slopes in pairs]
 
-    def _with_slopes(self, values: Array, free: Sequence[int], drive: RobotDrive) -> Made:
-        made = self._moved(values, drive)
+    def _slopes(self, values: Array, free: Sequence[int], drive: RobotDrive, made: Stretches) -> Slopes:
         many, k = made.spare.shape
         slopes = Slopes(
             np.zeros((many, 3, len(free))),
@@ -191,7 +201,33 @@ class Model:
                 if sides:
                     slopes.spare[:, :, column] = (other.spare - made.spare) / step
                     slopes.astray[:, :, column] = (other.astray - made.astray) / step
-        return made, slopes
+        return slopes
+
+    def put_beside(self, values: Array) -> None:
+        """Have sides from now on by the clocks of these numbers: hitches tell of motions at the same times.
+        They tell what they would with these numbers."""
+        if any(drive.hitches for drive in self.drives):
+            self._beside, self._slips, self._last = values.copy(), {}, None
+
+    def _slipping(self, drive: RobotDrive) -> Slipping:
+        """What wheels that slip do, by the numbers of `put_beside`; kept until the next."""
+        if drive not in self._slips:
+            made = self._moved(self._beside, drive)
+            turned = np.zeros((len(made.motions), len(drive.hitches), drive.counts.shape[1]))
+            for place in range(turned.shape[2]):
+                more = replace(drive, counts=_scaled(drive.counts, place, 1.0 + _STEP, 0.0))
+                astray = self._moved(self._beside, more, whole=False).astray
+                turned[:, :, place] = (made.astray - astray)[:, drive.hitches] / _STEP
+            self._slips[drive] = slipping(made, turned)
+        return self._slips[drive]
+
+    def _told(self, drive: RobotDrive, made: Stretches, slopes: Slopes, noise: DriveNoise) -> ToldMotions:
+        variances, hitches = np.array([noise.counters, noise.across, noise.turns]) ** 2, drive.hitches
+        if not hitches:
+            return ToldMotions(made.motions, slopes.ends, made.noise, variances, NOTHING)
+        astray, by = (np.ascontiguousarray(part[:, hitches]) for part in (made.astray, slopes.astray))
+        slips, own = self._slipping(drive), noise.following**2
+        return told_by_hitches(made.motions, slopes.ends, astray, by, slips, variances, own)
 
     def forget(self) -> None:
         """Let go of the stretches that are kept."""
@@ -221,9 +257,9 @@ class Model:
         elif drive.rows == 2:  # the heading where it begins is the body's
             where[2], mount[2] = -1, 0.0
         columns = np.array([free.index(i) if i >= 0 and i in free else -1 for i in where], dtype=np.int64)
-        ends = slopes.ends if slopes.ends.shape[2] else np.zeros((len(made.motions), 3, 1))
+        moved = self._told(drive, made, slopes, noise)
+        ends = moved.ends if moved.ends.shape[2] else np.zeros((len(moved.ends), 3, 1))
         many, r = len(drive.at), drive.rows
-        variances = np.array([noise.counters, noise.across, noise.turns]) ** 2
         z = drive.z if r == 3 else _with_headings(drive, made, mount, max(SEEN, 30.0 * noise.place))
         R = np.array([noise.place**2, noise.place**2, noise.heading**2 if r == 3 else 1.0])
         R = R + (noise.jitter * _speeds(drive, made)) ** 2
@@ -234,10 +270,11 @@ class Model:
             np.zeros((many, 3)),
             drive.taken == TAKEN,
             agreement(drive, made, slopes, noise.agreement, self.free_inputs),
-            following(drive, made, slopes, noise.following * self.hitch_shares),
+            moved.beside,
         )
-        given = made.motions, np.ascontiguousarray(ends), made.noise, variances, np.ascontiguousarray(z)
-        self._filter(*given, drive.taken, R, mount, columns, result.w, result.S, result.W, result.poses)
+        stretched = moved.motions, np.ascontiguousarray(ends), moved.noise, moved.variances
+        looks = np.ascontiguousarray(z), drive.taken, R, mount, columns
+        self._filter(*stretched, *looks, result.w, result.S, result.W, result.poses)
         return result
 
 

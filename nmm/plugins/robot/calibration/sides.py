@@ -1,4 +1,4 @@
-"""What is known beside a reference: how counters that are more than inputs agree, and how hitches follow."""
+"""What is known beside a reference: how counters that are more than inputs agree."""
 
 from __future__ import annotations
 
@@ -34,6 +34,10 @@ class SideRows(NamedTuple):
     free: int
 
 
+#: Where nothing is known.
+NOTHING = SideRows(np.zeros(0), np.zeros((0, 0)), np.zeros(0), 0.0, 0)
+
+
 def agreement(drive: RobotDrive, made: Stretches, slopes: Slopes, noise: float, inputs: int) -> SideRows:
     """What counters say beyond motions over some stretches at once, over the deviation that their noise
     gives it.
@@ -46,7 +50,7 @@ def agreement(drive: RobotDrive, made: Stretches, slopes: Slopes, noise: float, 
     went = np.add.reduceat(made.counted.mean(axis=1), begins)
     moved = went > 0.0
     if k <= inputs or not np.any(moved):
-        return SideRows(np.zeros(0), np.zeros((0, slopes.spare.shape[2])), np.zeros(0), 0.0, 0)
+        return NOTHING
     spare, by = (np.add.reduceat(part, begins, axis=0) for part in (made.spare, slopes.spare))
     deviations = noise * np.sqrt(np.where(moved, went, 1.0))
     weights = np.repeat(np.where(moved, 1.0 / deviations, 0.0), k)
@@ -54,12 +58,3 @@ def agreement(drive: RobotDrive, made: Stretches, slopes: Slopes, noise: float, 
     logarithms = 2.0 * (k - inputs) * float(np.sum(np.log(deviations[moved])))
     some = (k - inputs) * int(np.count_nonzero(moved))
     return SideRows(spare.ravel() * weights, rows, weights, logarithms, some)
-
-
-def following(drive: RobotDrive, made: Stretches, slopes: Slopes, noise: Array) -> SideRows:
-    """How far hitches turned otherwise than they follow, over the deviation of it, noise (n_p - 3,)."""
-    levels = noise[drive.hitches]
-    over = (made.astray[:, drive.hitches] / levels).ravel()
-    rows = slopes.astray[:, drive.hitches].reshape(len(over), slopes.astray.shape[2])
-    weights = np.tile(1.0 / levels, len(made.astray))
-    return SideRows(over, rows, weights, 2.0 * len(made.astray) * float(np.sum(np.log(levels))), len(over))
