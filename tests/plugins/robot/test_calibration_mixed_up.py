@@ -100,7 +100,22 @@ MIXED: dict[str, tuple[str, Callable[[], nmm.DriveLog], str]] = {
         lambda: scaled(log_of(TRAILER), hitch1=-1.0),
         "with the other sign of hitch1;",
     ),
+    "the second hitch's sign": (
+        TRAILER,
+        lambda: scaled(log_of(TRAILER), hitch2=-1.0),
+        "with the other sign of hitch2;",
+    ),
+    "hitches swapped": (
+        TRAILER,
+        lambda: swapped(log_of(TRAILER), "hitch1", "hitch2"),
+        "with hitch1 and hitch2 swapped;",
+    ),
 }
+#: By cases, who disagrees, and of what it is a share.
+OF_HITCHES = dict.fromkeys(
+    ("a hitch's sign", "the second hitch's sign", "hitches swapped"),
+    ("wheels and hitches", " of a hitch's turns; by "),
+)
 
 
 @pytest.mark.parametrize("case", MIXED)
@@ -109,7 +124,9 @@ def test_what_is_mixed_up_is_refused_with_what_would_fit(case: str) -> None:
     with pytest.raises(InputError) as caught:
         nmm.calibrate(nmm.load(base), make())
     said = str(caught.value)
-    assert said.startswith(f"calibrate {base}: drive: wheels and reference disagree by "), said
+    who, share = OF_HITCHES.get(case, ("wheels and reference", " of the way; by "))
+    assert said.startswith(f"calibrate {base}: drive: {who} disagree by "), said
+    assert share in said, said
     assert words in said, said
     assert len(said) <= 300
 
@@ -117,6 +134,9 @@ def test_what_is_mixed_up_is_refused_with_what_would_fit(case: str) -> None:
 RIGHT_LOGS: dict[str, tuple[str, Callable[[], nmm.DriveLog]]] = {
     **{base: (base, lambda base=base: log_of(base)) for base in BASES},  # type: ignore[misc]
     "straight ahead": (TWO, lambda: log_of(inputs=lambda t: np.full((len(t), 2), 5.0))),
+    "a trailer straight ahead": (
+        TRAILER, lambda: log_of(TRAILER, inputs=lambda t: np.full((len(t), 2), [0.5, 0.0]))
+    ),
     "on the spot": (
         TWO, lambda: log_of(inputs=lambda t: 5.0 * np.sin(t)[:, np.newaxis] * [1.0, -1.0])
     ),

@@ -22,6 +22,7 @@ from nmm.plugins.robot.calibration.model import Model
 from nmm.plugins.robot.calibration.parameters import MOUNT
 from nmm.plugins.robot.calibration.planar import along_body
 from nmm.plugins.robot.calibration.screening import screened
+from nmm.plugins.robot.calibration.stretches import Stretches, at_times
 from nmm.plugins.robot.odometry import Counters
 
 #: Of a log so many looks are compared at most.
@@ -33,6 +34,8 @@ ROUGH = FIRST._replace(place=0.02, counters=0.05, across=0.05, turns=0.05, agree
 #: Dead reckoning that is off by a smaller share of its way, and wheels that agree but for a smaller share of
 #: what they count, are not doubted.
 RIGHT, AGREE = 0.15, 0.02
+#: Nor are hitches that turn as they follow but for a smaller share of their turns.
+FOLLOW = 0.5
 #: Another reading of a log fits where less than this share of what is off is left.
 FITS = 0.3
 #: Readings of a log that fit as well are named, too, but so many at most.
@@ -41,22 +44,36 @@ ALIKE, NAMED = 1.5, 2
 
 @dataclass(frozen=True)
 class Rest:
-    """What a short fit of a drive leaves: of dead reckoning, as a share of its way, and of what counters say
-    twice, as a share of it; how far the reference would be turned on the robot, rad."""
+    """What a short fit of a drive leaves: of dead reckoning, as a share of its way, of what counters say
+    twice, as a share of it, and of the hitch that follows worst, as a share of its turns; how far the
+    reference would be turned on the robot, rad."""
 
     way: float
     twice: float
+    astray: float
     yaw: float
 
     @property
-    def doubtful(self) -> bool:
-        return self.way > RIGHT or self.twice > AGREE
+    def doubtful(self) -> str:
+        """What is left too much of, "" where nothing is."""
+        limits = {"way": RIGHT, "twice": AGREE, "astray": FOLLOW}
+        return next((name for name, limit in limits.items() if getattr(self, name) > limit), "")
 
     def fits(self, before: Rest) -> bool:
         """Whether it is what a right log leaves, beside what was left `before`."""
-        if before.way > RIGHT:
-            return self.way < min(FITS * before.way, RIGHT) and self.twice < max(before.twice, AGREE)
-        return self.twice < FITS * before.twice and self.way < max(ALIKE * before.way, 0.3 * RIGHT)
+        doubted = before.doubtful
+        if getattr(self, doubted) >= FITS * getattr(before, doubted) or self.way >= RIGHT:
+            return False
+        near = doubted == "way" or self.way < max(ALIKE * before.way, 0.3 * RIGHT)
+        return near and self.twice < max(before.twice, AGREE) and self.astray < max(before.astray, FOLLOW)
+
+
+#: Who disagrees, and of what it is a share.
+WHO = {
+    "way": ("wheels and reference disagree", "the way"),
+    "twice": ("the wheels disagree among themselves", "the way"),
+    "astray": ("wheels and hitches disagree", "a hitch's turns"),
+}
 
 
 def check_mixed_up(
@@ -71,7 +88,7 @@ def check_mixed_up(
         return
     others = [(words, thinned(other)) for words, other in _others(robot, counters, drive)]
     at_once = [_rest(robot, counters, other, held, steps=0) for _, other in others]
-    size = [math.inf if rest is None else rest.way + rest.twice for rest in at_once]
+    size = [math.inf if rest is None else rest.way + rest.twice + rest.astray for rest in at_once]
     likely = sorted(range(len(others)), key=lambda i: size[i])[:TRIED]
     found: list[tuple[Rest, str]] = []
     for i in sorted(likely):
@@ -80,16 +97,17 @@ def check_mixed_up(
             found.append((rest, others[i][0]))
     if not found:
         return
-    doubled = before.way <= RIGHT
-    size = [rest.twice if doubled else rest.way for rest, _ in found]
+    doubted = before.doubtful
+    size = [getattr(rest, doubted) for rest, _ in found]
     near = [one for one, left in zip(found, size, strict=True) if left < ALIKE * min(size)]
     least = min(abs(rest.yaw) for rest, _ in near)
     near = [one for one in near if abs(one[0].yaw) < least + 0.5 * math.pi]
     fitting = " or ".join(words for _, words in near[:NAMED])
-    off = f"{100.0 * (before.twice if doubled else before.way):.3g} %"
-    left = f"{100.0 * (near[0][0].twice if doubled else near[0][0].way):.2g} %"
-    who = "the wheels disagree among themselves by" if doubled else "wheels and reference disagree by"
-    what = f"{who} {off} of the way; by {left} with {fitting}"
+    off, left = (
+        f"{100.0 * getattr(rest, doubted):.{digits}g} %" for rest, digits in ((before, 3), (near[0][0], 2))
+    )
+    who, share = WHO[doubted]
+    what = f"{who} by {off} of {share}; by {left} with {fitting}"
     expected = "the file's joints and signs; y to the left, headings counter-clockwise"
     raise InputError(what, where=f"{counters.where}: {drive.name}", expected=expected)
 
@@ -152,7 +170,15 @@ def _left(model: Model, values: Array) -> Rest | None:
         return None
     counted = sum(float(one.counted.sum()) for one, _ in made)
     twice = sum(float(np.abs(one.spare).sum()) for one, _ in made)
-    return Rest(float(np.median(off_by(errors))) / length, twice / counted, float(model.mount(values)[2]))
+    way = float(np.median(off_by(errors))) / length
+    return Rest(way, twice / counted, _astray(model.drives[0], made[0][0]), float(model.mount(values)[2]))
+
+
+def _astray(drive: RobotDrive, made: Stretches) -> float:
+    """Of the hitch that follows worst, how far it turned otherwise, as a share of its turns; 0 without."""
+    turned = np.diff(at_times(drive.at - drive.delay, drive.t, drive.own[:, drive.hitches]), axis=0)
+    off = np.abs(made.astray[:, drive.hitches]).sum(axis=0) / np.maximum(np.abs(turned).sum(axis=0), 1e-9)
+    return float(off.max(initial=0.0))
 
 
 def _others(robot: Robot, counters: Counters, drive: RobotDrive) -> Iterator[tuple[str, RobotDrive]]:
