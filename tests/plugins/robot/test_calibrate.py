@@ -16,6 +16,7 @@ from scipy.optimize import least_squares
 
 import nmm
 from nmm.base.errors import InputError
+from nmm.plugins.robot.calibration.report import rest_rows
 from nmm.plugins.robot.calibration.stretches import stretches
 from nmm.plugins.robot.odometry import Counters
 
@@ -89,6 +90,12 @@ def test_the_robots_own_numbers_come_back(name: str) -> None:
     assert np.sqrt(np.diag(found.covariance)) == pytest.approx(
         [found.numbers[n].deviation for n in found.learned]
     )
+
+
+def test_a_robot_with_hitches_is_told_what_they_turn_by_themselves() -> None:
+    rows = {name: [*rest_rows(calibration(name))] for name in ("differential_base", "trailer_base")}
+    assert "noise of a hitch" not in [row[0] for row in rows["differential_base"]]
+    assert ["noise of a hitch", "0.05 mrad from look to look"] in rows["trailer_base"]
 
 
 def test_noise_is_what_was_put_in() -> None:

@@ -161,6 +161,8 @@ def _noise_rows(result: Calibration) -> Iterator[list[str]]:
         across = f"{length(noise.across)} across for a metre, {angle(noise.turns)} for a radian turned"
         yield ["noise of the platform", across]
     yield ["noise of a counter", f"{angle(noise.counters)} for a radian"]
+    if any(drive.hitches for drive in result.model.drives):
+        yield ["noise of a hitch", f"{angle(noise.following)} from look to look"]
 
 
 def umbmark_rows(robot: Robot, logs: Sequence[DriveLog]) -> list[list[str]]:
