@@ -114,9 +114,14 @@ def _integrated(
     """Own joints (N, n_p - 3), counters (N, k) and how far they rolled (N, k), by inputs (N - 1, p), each for
     dt, s, with slips (N - 1, k) for a rad that they count (and with its root)."""
     n_p, steered = robot.platform.n_p, counters.steered.values()
-    free = [i for i in range(robot.platform.p) if i not in steered]  # steering joints turn as they are told
     qp, own = np.zeros(n_p), np.zeros((len(u) + 1, n_p - 3))
     counts, rolled = np.zeros((2, len(u) + 1, len(counters.names)))
+    if n_p == 3:
+        counted = dt * u @ counters.matrix(qp[3:])[0].T
+        counts[1:] = np.cumsum(counted, axis=0)
+        rolled[1:] = counts[1:] + np.cumsum(slips * np.sqrt(np.abs(counted)), axis=0)
+        return own, counts, rolled
+    free = [i for i in range(robot.platform.p) if i not in steered]  # steering joints turn as they are told
     for n, un in enumerate(u):
         M = counters.matrix((qp + 0.5 * dt * robot.platform.G(qp) @ un)[3:])[0]
         counted = dt * M @ un

@@ -100,7 +100,6 @@ def fit(
             values = solve(model, values, sought, level, prior=PRIOR)
             if turn == 0 and plain_jumps(model, values, level):
                 values = solve(model, values, sought, level, prior=PRIOR)
-            model.put_beside(values)
             level = noise_of(model, values, sought, level)
             if turn == 1:
                 rejoin(model, values, level)
@@ -123,7 +122,6 @@ def fit(
         progress(f"least squares, {turn + 1} of 2")
         values = solve(model, values, free, level)
         if like is None:
-            model.put_beside(values)
             level = noise_of(model, values, free, level, FEW_AT_LAST if turn else FEW)
     values = solve(model, values, free, level)
     filtered = model.filtered(values, free, model.stretched(values, free), level)
@@ -237,6 +235,7 @@ def noise_of(
     the counters alone. Counters err no less than those of one robot disagree. With less than `few`
     innovations a number it is that of what the free numbers leave (D. A. Harville, Maximum likelihood
     approaches to variance component estimation, JASA 72, 1977)."""
+    model.put_beside(values)
     made = model.stretched(values, [])
     as_before = model.filtered(values, [], made, first)
     beside = [drive_fit.agreement for drive_fit in as_before]
